@@ -1,0 +1,182 @@
+"""References to stored tables, and the only place that reads and writes them.
+
+An artifact is one immutable Parquet file, named by the hash of its content. A stage passes a
+`Ref` on, never the arrays.
+"""
+
+import os
+import re
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pydantic import BaseModel, ConfigDict, field_validator
+
+from storage.errors import DamagedArtifact, StoreError
+
+T = TypeVar("T")
+
+SCHEMA_VERSION = "1"
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
+"""What a building, storey or scan may be called: it becomes a folder."""
+
+
+class Ref(BaseModel):
+    """A pointer to an immutable artifact: where it lies, what is in it, how much of it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    uri: str
+    """Path of the Parquet file."""
+    sha256: str
+    """Hash of its bytes."""
+    rows: int
+    """Rows in it."""
+    table: str
+    """The stored thing it holds."""
+
+
+class Place(BaseModel):
+    """Where a stage works: the store, the run, and what of the world it is about."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    store: str
+    run: str
+    building: str
+    storey: str
+    scan: str | None = None
+
+    @field_validator("building", "storey", "scan")
+    @classmethod
+    def _is_a_name(cls, value: str | None) -> str | None:
+        if value is not None:
+            check_name(value)
+        return value
+
+    def of_scan(self, scan: str) -> "Place":
+        """Return the place of one scan of this storey."""
+        return self.model_copy(update={"scan": check_name(scan)})
+
+    def folder(self, table: str) -> Path:
+        """Return the folder a table's files of this place lie in (hive partitions)."""
+        folder = Path(self.store) / table / f"building={self.building}" / f"storey={self.storey}"
+        return folder / f"scan={self.scan}" if self.scan is not None else folder
+
+
+def check_name(name: str) -> str:
+    """Return `name` if it may name a folder of the store, else raise ValueError."""
+    if not NAME.fullmatch(name) or ".." in name:
+        raise ValueError(
+            f"{name!r} is no usable name: letters, digits, '_', '-' and '.', "
+            "not starting with '.' or '-'"
+        )
+    return name
+
+
+@dataclass(frozen=True)
+class Kind(Generic[T]):
+    """How one stored thing becomes a table and back."""
+
+    table: str
+    type: type[T]
+    schema: pa.Schema
+    to_table: Callable[[T], pa.Table]
+    from_table: Callable[[pa.Table], T]
+    write_options: dict[str, Any] | None = None
+
+
+_kinds: dict[type, Kind[Any]] = {}
+
+
+def register(kind: Kind[T]) -> Kind[T]:
+    """Make a stored thing known by its type; called once by the module that defines it."""
+    _kinds[kind.type] = kind
+    return kind
+
+
+def kind_of(type_: type[T]) -> Kind[T] | None:
+    """Return how `type_` is stored, None if it is no stored thing."""
+    return _kinds.get(type_)
+
+
+def schema(table: str, fields: list[pa.Field], **extra: str) -> pa.Schema:
+    """Return an Arrow schema stamped with the table's name and schema version."""
+    metadata = {"mapsense.table": table, "mapsense.schema_version": SCHEMA_VERSION} | extra
+    return pa.schema(fields, metadata=metadata)
+
+
+def column(name: str, type_: pa.DataType, about: str, *, nullable: bool = False) -> pa.Field:
+    """Return a column that says what it holds; its unit is the end of its name."""
+    return pa.field(name, type_, nullable=nullable, metadata={"about": about})
+
+
+def write(kind: Kind[T], value: T, place: Place) -> Ref:
+    """Write `value` beside its target, sync, rename: a reader sees all of it or nothing."""
+    table = kind.to_table(value)
+    return write_table(kind.table, table, place.folder(kind.table), kind.write_options or {})
+
+
+def write_table(name: str, table: pa.Table, folder: Path, options: dict[str, Any]) -> Ref:
+    """Write one Parquet file named by the hash of its content into `folder`, atomically."""
+    # a dot file: no *.parquet glob sees it before the rename
+    temporary = folder / f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with open(temporary, "wb") as file:
+            pq.write_table(table, file, **({"compression": "zstd"} | options))
+            file.flush()
+            os.fsync(file.fileno())
+        digest = _hash(temporary)
+        target = folder / f"{digest[:24]}.parquet"
+        os.replace(temporary, target)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise StoreError(
+            f"{folder}: cannot write table '{name}' ({error.strerror or error}); make the store "
+            "writable, free space on its disk, or choose another with --store"
+        ) from error
+    return Ref(uri=str(target), sha256=digest, rows=table.num_rows, table=name)
+
+
+def read(kind: Kind[T], ref: Ref) -> T:
+    """Read the value behind a reference, after checking that it is what the reference names."""
+    check(ref)
+    return kind.from_table(pq.read_table(ref.uri, partitioning=None, memory_map=True))
+
+
+def check(ref: Ref) -> None:
+    """Raise DamagedArtifact unless the artifact is there and its bytes are the ones named."""
+    try:
+        found = _hash(Path(ref.uri))
+    except OSError as error:
+        raise DamagedArtifact(
+            f"{ref.uri}: the artifact cannot be read ({error.strerror}); run again, it is remade"
+        ) from error
+    if found != ref.sha256:
+        raise DamagedArtifact(
+            f"{ref.uri}: the artifact was changed or cut after it was written; "
+            "run again, it is remade"
+        )
+
+
+def is_sound(ref: Ref) -> bool:
+    """Return whether the artifact behind a reference is there, whole."""
+    try:
+        check(ref)
+    except DamagedArtifact:
+        return False
+    return True
+
+
+def _hash(path: Path) -> str:
+    digest = sha256()
+    with open(path, "rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
