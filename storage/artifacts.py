@@ -4,6 +4,7 @@ An artifact is one immutable Parquet file, named by the hash of its content. A s
 `Ref` on, never the arrays.
 """
 
+import contextlib
 import os
 import re
 import uuid
@@ -32,7 +33,7 @@ class Ref(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     uri: str
-    """Path of the Parquet file."""
+    """Path of the Parquet file relative to its store, so that a store can be moved."""
     sha256: str
     """Hash of its bytes."""
     rows: int
@@ -63,10 +64,10 @@ class Place(BaseModel):
         """Return the place of one scan of this storey."""
         return self.model_copy(update={"scan": check_name(scan)})
 
-    def folder(self, table: str) -> Path:
-        """Return the folder a table's files of this place lie in (hive partitions)."""
-        folder = Path(self.store) / table / f"building={self.building}" / f"storey={self.storey}"
-        return folder / f"scan={self.scan}" if self.scan is not None else folder
+    def folder(self, table: str) -> str:
+        """Return the folder a table's files of this place lie in, relative to the store."""
+        folder = f"{table}/building={self.building}/storey={self.storey}"
+        return f"{folder}/scan={self.scan}" if self.scan is not None else folder
 
 
 def check_name(name: str) -> str:
@@ -100,6 +101,11 @@ def register(kind: Kind[T]) -> Kind[T]:
     return kind
 
 
+def kinds() -> list[Kind[Any]]:
+    """Return all stored things known so far."""
+    return list(_kinds.values())
+
+
 def kind_of(type_: type[T]) -> Kind[T] | None:
     """Return how `type_` is stored, None if it is no stored thing."""
     return _kinds.get(type_)
@@ -117,13 +123,31 @@ def column(name: str, type_: pa.DataType, about: str, *, nullable: bool = False)
 
 
 def write(kind: Kind[T], value: T, place: Place) -> Ref:
-    """Write `value` beside its target, sync, rename: a reader sees all of it or nothing."""
+    """Write `value` into the store as one Parquet file named by the hash of its content."""
     table = kind.to_table(value)
-    return write_table(kind.table, table, place.folder(kind.table), kind.write_options or {})
+    folder = place.folder(kind.table)
+    digest = ""
+
+    def target(temporary: Path) -> Path:
+        nonlocal digest
+        digest = _hash(temporary)
+        return Path(place.store) / folder / f"{digest[:24]}.parquet"
+
+    path = _put(table, Path(place.store) / folder, target, kind.write_options or {})
+    return Ref(
+        uri=f"{folder}/{path.name}", sha256=digest, rows=table.num_rows, table=kind.table
+    )
 
 
-def write_table(name: str, table: pa.Table, folder: Path, options: dict[str, Any]) -> Ref:
-    """Write one Parquet file named by the hash of its content into `folder`, atomically."""
+def replace_table(path: Path, table: pa.Table) -> None:
+    """Write a table to `path`, in place of what is there: a reader sees the old or the new."""
+    _put(table, path.parent, lambda _: path, {})
+
+
+def _put(
+    table: pa.Table, folder: Path, target: Callable[[Path], Path], options: dict[str, Any]
+) -> Path:
+    """Write beside the target, sync, rename: a reader sees all of it or nothing."""
     # a dot file: no *.parquet glob sees it before the rename
     temporary = folder / f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp"
     try:
@@ -132,43 +156,45 @@ def write_table(name: str, table: pa.Table, folder: Path, options: dict[str, Any
             pq.write_table(table, file, **({"compression": "zstd"} | options))
             file.flush()
             os.fsync(file.fileno())
-        digest = _hash(temporary)
-        target = folder / f"{digest[:24]}.parquet"
-        os.replace(temporary, target)
+        path = target(temporary)
+        os.replace(temporary, path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # what stopped the writing may stop this too
+            temporary.unlink()
         raise StoreError(
-            f"{folder}: cannot write table '{name}' ({error.strerror or error}); make the store "
+            f"{folder}: cannot write there ({error.strerror or error}); make the store "
             "writable, free space on its disk, or choose another with --store"
         ) from error
-    return Ref(uri=str(target), sha256=digest, rows=table.num_rows, table=name)
+    return path
 
 
-def read(kind: Kind[T], ref: Ref) -> T:
+def read(kind: Kind[T], ref: Ref, store: Path | str) -> T:
     """Read the value behind a reference, after checking that it is what the reference names."""
-    check(ref)
-    return kind.from_table(pq.read_table(ref.uri, partitioning=None, memory_map=True))
+    check(ref, store)
+    path = Path(store) / ref.uri
+    return kind.from_table(pq.read_table(path, partitioning=None, memory_map=True))
 
 
-def check(ref: Ref) -> None:
+def check(ref: Ref, store: Path | str) -> None:
     """Raise DamagedArtifact unless the artifact is there and its bytes are the ones named."""
+    path = Path(store) / ref.uri
     try:
-        found = _hash(Path(ref.uri))
+        found = _hash(path)
     except OSError as error:
         raise DamagedArtifact(
-            f"{ref.uri}: the artifact cannot be read ({error.strerror}); run again, it is remade"
+            f"{path}: the artifact cannot be read ({error.strerror}); run again, it is remade"
         ) from error
     if found != ref.sha256:
         raise DamagedArtifact(
-            f"{ref.uri}: the artifact was changed or cut after it was written; "
+            f"{path}: the artifact was changed or cut after it was written; "
             "run again, it is remade"
         )
 
 
-def is_sound(ref: Ref) -> bool:
+def is_sound(ref: Ref, store: Path | str) -> bool:
     """Return whether the artifact behind a reference is there, whole."""
     try:
-        check(ref)
+        check(ref, store)
     except DamagedArtifact:
         return False
     return True

@@ -1,0 +1,162 @@
+"""The runs of storeys: what was asked, when, and how it ended; enough to run it again."""
+
+import fcntl
+import json
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from storage.artifacts import Place, column, replace_table, schema
+from storage.errors import StoreError
+
+RUNNING, COMPLETED, PARTIAL, FAILED = "running", "completed", "partial", "failed"
+MAPPED = (COMPLETED, PARTIAL)
+"""States that left a plan; of a partial run some scans were skipped."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of one storey."""
+
+    id: str
+    verb: str
+    building: str
+    storey: str
+    asked: str
+    started_at: datetime
+    ended_at: datetime | None = None
+    state: str = RUNNING
+    message: str = ""
+
+    def request(self) -> dict[str, Any]:
+        """Return what was asked."""
+        return json.loads(self.asked)
+
+
+SCHEMA = schema(
+    "runs",
+    [
+        column("id", pa.string(), "the run"),
+        column("verb", pa.string(), "what asked for it: map, demo or a flow"),
+        column("asked", pa.string(), "JSON: sources, parameters, where the results go"),
+        column("started_at", pa.timestamp("us", tz="UTC"), "start"),
+        column("ended_at", pa.timestamp("us", tz="UTC"), "end; null if it has none", nullable=True),
+        column("state", pa.string(), "running, completed, partial (scans skipped) or failed"),
+        column("message", pa.string(), "what a person should know of the end; '' if nothing"),
+    ],
+)
+
+
+def new_id(now: datetime | None = None) -> str:
+    """Return an id that sorts by time."""
+    return f"{now or datetime.now(UTC):%Y%m%dT%H%M%S.%f}-{uuid.uuid4().hex[:6]}"
+
+
+@dataclass
+class Recorder:
+    """Holds how a run that goes on has ended, once that is known."""
+
+    run: Run
+
+    def end(self, state: str, message: str) -> None:
+        """Say how the run ended; written when the run is left."""
+        self.run = replace(self.run, state=state, message=message)
+
+
+@contextmanager
+def recorded(store: str, run: Run) -> Iterator[Recorder]:
+    """Record a run at its start and at its end; one that raises is recorded as failed.
+
+    While it goes on, the run holds a lock that its death drops: so others can tell a run that
+    goes on from one that was killed.
+    """
+    held = _hold(_lock(store, run.id))
+    recorder = Recorder(run)
+    try:
+        _write(store, run)
+        yield recorder
+    except BaseException as error:
+        recorder.end(FAILED, _first_line(error))
+        raise
+    finally:
+        ended = replace(recorder.run, ended_at=datetime.now(UTC))
+        _write(store, ended)
+        os.close(held)
+        _lock(store, run.id).unlink(missing_ok=True)
+
+
+def goes_on(store: str, run: Run) -> bool:
+    """Return whether the process of a run is still at it."""
+    if run.state != RUNNING:
+        return False
+    try:
+        descriptor = os.open(_lock(store, run.id), os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+def read_runs(
+    store: Path | str, building: str | None = None, storey: str | None = None
+) -> list[Run]:
+    """Return the runs of a store, or of one building or storey of it, by their start."""
+    pattern = f"runs/building={building or '*'}/storey={storey or '*'}/*.parquet"
+    runs = []
+    for path in Path(store).glob(pattern):
+        names = dict(part.split("=", 1) for part in path.parts[-3:-1])
+        try:
+            rows = pq.read_table(path, columns=SCHEMA.names, partitioning=None).to_pylist()
+        except (OSError, pa.ArrowException) as error:
+            raise StoreError(
+                f"{path}: is no record of a run ({_first_line(error)}); remove the file"
+            ) from error
+        runs += [Run(building=names["building"], storey=names["storey"], **row) for row in rows]
+    return sorted(runs, key=lambda run: (run.started_at, run.id))
+
+
+def last_runs(runs: list[Run]) -> list[Run]:
+    """Return the last run of each storey, by building and storey."""
+    last = {(run.building, run.storey): run for run in runs}
+    return [last[key] for key in sorted(last)]
+
+
+def _write(store: str, run: Run) -> None:
+    place = Place(store=store, run=run.id, building=run.building, storey=run.storey)
+    row = {name: value for name, value in asdict(run).items() if name in SCHEMA.names}
+    path = Path(store) / place.folder("runs") / f"{run.id}.parquet"
+    replace_table(path, pa.Table.from_pylist([row], SCHEMA))
+
+
+def _lock(store: str, run: str) -> Path:
+    return Path(store) / ".locks" / f"run-{run}.lock"
+
+
+def _hold(path: Path) -> int:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise StoreError(
+            f"{path.parent}: cannot write there ({error.strerror}); make the store writable, or "
+            "choose another with --store"
+        ) from error
+    fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or [""])[0] or type(error).__name__

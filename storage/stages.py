@@ -1,0 +1,111 @@
+"""What each run of a stage cost, and how it ended: one row per stage and run, cached ones too.
+
+Each process keeps one file per flow run and storey and writes it anew with each row, atomically:
+a killed run loses no row of a stage that had ended, a reader never meets a row twice, and there
+are as many files as runs, not as rows.
+"""
+
+import os
+import threading
+from collections import defaultdict
+from dataclasses import dataclass, fields
+from datetime import datetime
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from storage.artifacts import Place, column, replace_table, schema
+
+OUTCOMES = ("computed", "cached", "failed")
+
+
+@dataclass(frozen=True)
+class StageRow:
+    """One run of one stage."""
+
+    id: str
+    run: str
+    scan: str | None
+    stage: str
+    key: str
+    outcome: str
+    wall_s: float
+    cpu_s: float
+    peak_memory_mb: float | None
+    rows_in: int
+    rows_out: int
+    points_in: int
+    points_out: int
+    error: str | None
+    started_at: datetime
+    outputs: tuple[str, ...] = ()
+
+
+SCHEMA = schema(
+    "stages",
+    [
+        column("id", pa.string(), "the task run"),
+        column("run", pa.string(), "the run of the storey, as in table runs"),
+        column("scan", pa.string(), "the scan; null for a stage over all scans", nullable=True),
+        column("stage", pa.string(), "name of the stage"),
+        column("key", pa.string(), "cache key: code, versions, parameters and inputs"),
+        column("outcome", pa.string(), "computed, cached or failed"),
+        column("wall_s", pa.float64(), "reading inputs, computing and writing; looking up a hit"),
+        column("cpu_s", pa.float64(), "processor time of the thread the stage ran in"),
+        column(
+            "peak_memory_mb",
+            pa.float64(),
+            "greatest resident memory of the whole process while the stage ran, sampled; "
+            "stages that ran beside it count too; null if cached or not known",
+            nullable=True,
+        ),
+        column("rows_in", pa.int64(), "rows of all input tables"),
+        column("rows_out", pa.int64(), "rows of all output tables"),
+        column("points_in", pa.int64(), "rows of input tables 'points'"),
+        column("points_out", pa.int64(), "rows of output tables 'points'"),
+        column("error", pa.string(), "first line of the error; null if none", nullable=True),
+        column("started_at", pa.timestamp("us", tz="UTC"), "when the stage was asked for"),
+        column("outputs", pa.list_(pa.string()), "artifacts, relative to the store"),
+    ],
+)
+
+_written: dict[tuple[str, str, str], list[StageRow]] = defaultdict(list)
+_mutex = threading.Lock()
+
+
+def append(place: Place, row: StageRow) -> None:
+    """Add a row to the file this process keeps for the place's run and storey."""
+    folder = place.model_copy(update={"scan": None}).folder("stages")
+    with _mutex:
+        rows = _written[place.store, folder, place.run]
+        rows.append(row)
+        # the process id: a run's stages may be spread over several processes
+        path = Path(place.store) / folder / f"{place.run}-{os.getpid()}.parquet"
+        replace_table(path, to_table(rows))
+
+
+def of_run(place: Place) -> list[StageRow]:
+    """Return the rows of one run of a storey, in the order they ended in."""
+    folder = Path(place.store) / place.model_copy(update={"scan": None}).folder("stages")
+    files = sorted(folder.glob(f"{place.run}-*.parquet"))
+    return [row for file in files for row in from_table(pq.read_table(file, partitioning=None))]
+
+
+def forget(place: Place) -> None:
+    """Drop what this process keeps of a run that has ended."""
+    folder = place.model_copy(update={"scan": None}).folder("stages")
+    with _mutex:
+        _written.pop((place.store, folder, place.run), None)
+
+
+def to_table(rows: list[StageRow]) -> pa.Table:
+    """Return one row per stage run."""
+    names = [field.name for field in fields(StageRow)]
+    columns = {name: [getattr(row, name) for row in rows] for name in names}
+    return pa.table([columns[name] for name in SCHEMA.names], schema=SCHEMA)
+
+
+def from_table(table: pa.Table) -> list[StageRow]:
+    """Return the rows a table holds."""
+    return [StageRow(**row | {"outputs": tuple(row["outputs"])}) for row in table.to_pylist()]

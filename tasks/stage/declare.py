@@ -1,0 +1,125 @@
+"""A pure function made a cached, timed Prefect task by one declaration.
+
+    planes = stage(detect_planes, name="planes")
+    ref = planes(place, points_ref, HoughParams())
+
+What the function needs to know of all this: nothing.
+"""
+
+import inspect
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from prefect import Task
+from prefect.client.schemas.objects import TaskRun
+from prefect.context import TaskRunContext
+from prefect.futures import PrefectFuture
+from prefect.states import State
+
+from storage.artifacts import Place, Ref, check_name, write
+from tasks.stage import ledger, records
+from tasks.stage.meter import metered
+from tasks.stage.policy import policy_for
+from tasks.stage.signature import signature_of
+
+Made = Ref | list[Ref]
+"""What a stage returns: a reference, or a list of them where its function returns a tuple."""
+
+
+class Stage:
+    """A stage of the pipeline: called with a place, references and parameters, it makes references.
+
+    Parameters
+    ----------
+    fn : callable
+        Pure function of stored things and parameters, its types in its hints.
+    name : str
+        Name of the stage in keys, rows and runs.
+    """
+
+    def __init__(self, fn: Callable[..., Any], name: str) -> None:
+        self.fn, self.name = fn, check_name(name)
+        self.signature = signature_of(fn, name)
+        self._task = cache(self._new_task)
+
+    def __call__(self, place: Place, *args: Any, **kwargs: Any) -> Any:
+        """Run the stage here and now, or take its result from the cache."""
+        return self._task(place.store)(place, *args, **kwargs)
+
+    def submit(self, place: Place, *args: Any, **kwargs: Any) -> PrefectFuture[Made]:
+        """Hand the stage to the flow's task runner."""
+        return self._task(place.store).submit(place, *args, **kwargs)
+
+    def _new_task(self, store: str) -> Task[..., Any]:
+        return Task(
+            self._body(),
+            name=self.name,
+            cache_policy=policy_for(store, self.name, self.fn, self.signature),
+            persist_result=True,
+            result_storage=records.folder(store),
+            result_serializer="json",
+            cache_result_in_memory=False,  # what lies in the store counts, not what did
+            on_completion=[_completed],
+            on_failure=[_ended],
+        )
+
+    def _body(self) -> Callable[..., Made]:
+        """Return the function Prefect runs, of the place and the function's own arguments."""
+        of_stage = inspect.signature(self.fn)
+        own = of_stage.parameters.values()
+        place = inspect.Parameter("place", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        bound = inspect.Signature([place, *(p.replace(annotation=p.empty) for p in own)])
+
+        def body(*args: Any, **kwargs: Any) -> Made:
+            given = bound.bind(*args, **kwargs)
+            given.apply_defaults()
+            return self._run(given.arguments)
+
+        body.__name__, body.__doc__ = self.name, self.fn.__doc__
+        body.__signature__ = bound  # type: ignore[attr-defined]
+        return body
+
+    def _run(self, inputs: dict[str, Any]) -> Made:
+        """Read the inputs, compute, write the results and the row of the stage."""
+        context = TaskRunContext.get()
+        if context is None or context.task_run is None:
+            raise RuntimeError(f"stage '{self.name}' runs as a task only")
+        task_run = str(context.task_run.id)
+        asked = ledger.recall(task_run)
+        try:
+            with metered() as cost:
+                if asked.error is not None:
+                    raise asked.error
+                refs = self._compute(inputs)
+        except BaseException as error:
+            ledger.failed(task_run, asked, cost, error)
+            raise
+        # before Prefect commits the cache record: a kill in between loses no row
+        ledger.computed(task_run, asked, cost, refs)
+        return refs if self.signature.several else refs[0]
+
+    def _compute(self, inputs: dict[str, Any]) -> list[Ref]:
+        place: Place = inputs["place"]
+        values = {a.name: a.value(inputs[a.name], place.store) for a in self.signature.arguments}
+        result = self.fn(**values)
+        results = result if self.signature.several else (result,)
+        kinds = self.signature.results
+        return [write(kind, value, place) for kind, value in zip(kinds, results, strict=True)]
+
+
+def stage(fn: Callable[..., Any], name: str) -> Stage:
+    """Make a pure function a stage; TypeError if its hints do not say how."""
+    return Stage(fn, name)
+
+
+def _completed(task: Any, task_run: TaskRun, state: State[Any]) -> None:
+    """Write the row of a hit: Prefect does not call the function for it."""
+    asked = ledger.forget(str(task_run.id))
+    if state.name == "Cached" and asked is not None:
+        made = state.result()
+        ledger.cached(str(task_run.id), asked, made if isinstance(made, list) else [made])
+
+
+def _ended(task: Any, task_run: TaskRun, state: State[Any]) -> None:
+    ledger.forget(str(task_run.id))

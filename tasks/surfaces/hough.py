@@ -1,0 +1,393 @@
+"""Plane detection by a randomized Hough transform (Sec. 4.1, Fig. 3 line 2).
+
+Triplets drawn from a whole cloud meet a plane that holds a share f of it with probability f cubed:
+fine in a room, hopeless on a storey. So the cloud is thinned to an even density, cut into tiles of
+room size, and the transform runs in each: first with the wide range of distances, which finds
+walls, floor and ceiling and finds them straight, then on what is left with the narrow range,
+which reaches a chair's seat. Patches that a tile's border has cut are joined again; last, all
+points are labelled and every plane is refitted to all its inliers.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PositiveFloat, PositiveInt
+from scipy import ndimage
+
+from storage.planes import PlaneLabels, Planes
+from storage.points import PointCloud
+from tasks.params import Params
+from tasks.surfaces import patches, thinning, voting
+
+
+class HoughParams(Params):
+    """Parameters of plane detection."""
+
+    gamma_cell: PositiveInt = 20
+    """Votes that turn an accumulator cell into a plane (Fig. 13)."""
+    beta_min: PositiveFloat = 0.2
+    """Least distance between two points of one draw, metres (Fig. 13)."""
+    beta_max: PositiveFloat = 5.0
+    """Greatest distance between two points of one draw, metres (Fig. 13)."""
+    beta_near: PositiveFloat = 0.5
+    """Greatest distance in the second pass, which finds small surfaces, metres (Sec. 7.2, small
+    rooms; its least distance is beta_min)."""
+    cell_angle_rad: PositiveFloat = 0.035
+    """Width of a direction cell, radians. Not in the paper; 2 degrees, as 3DTK's."""
+    cell_offset_m: PositiveFloat = 0.05
+    """Width of an offset cell, metres. Not in the paper; as 3DTK's."""
+    tolerance_m: PositiveFloat | None = None
+    """Greatest distance of an inlier from its plane, metres; None: four times the cloud's own
+    noise, within 0.03 and 0.1. Not in the paper. Below four sigma a rim of each wall is left
+    over and found again."""
+    thin_m: PositiveFloat = 0.05
+    """Edge of the voxels of which one point each takes part in draws, metres. Not in the paper."""
+    tile_m: PositiveFloat = 7.0
+    """Size of the tiles a storey is cut into, metres. Not in the paper; about a room."""
+    min_area_m2: PositiveFloat = 0.12
+    """Smallest patch, square metres. Not in the paper; two thirds of a chair's seat."""
+    left_over: float = Field(default=0.003, ge=0, lt=1)
+    """Share of a tile's points at which the search ends. Not in the paper."""
+    tries: PositiveInt = 100_000
+    """Draws without a plane after which the wide pass ends. Not in the paper."""
+    tries_near: PositiveInt = 300_000
+    """Draws without a plane after which the narrow pass ends. Not in the paper."""
+    misses: PositiveInt = 6
+    """Full cells in a row that turn out to be no plane, after which a pass ends. Not in the
+    paper."""
+    seed: int = 0
+    """Seed of the draws. Not in the paper."""
+
+
+MIN_POINTS = 20
+"""Points below which a patch is an accident."""
+WIDE = 50.0
+"""Extent beyond which a cloud may hold more than its storey, metres."""
+REFIT_POINTS = 500_000
+"""Points that settle the planes well enough before all points are labelled."""
+
+
+def detect_planes(points: PointCloud, params: HoughParams) -> tuple[Planes, PlaneLabels]:
+    """Detect the planar patches of a cloud, most inliers first.
+
+    Parameters
+    ----------
+    points : PointCloud
+        n registered points in the building frame.
+    params : HoughParams
+
+    Returns
+    -------
+    Planes
+        m connected patches; m may be 0.
+    PlaneLabels
+        The patch of each point.
+
+    Notes
+    -----
+    Sec. 4.1. The paper leaves the accumulator open; this is the ball of Borrmann et al. (2011).
+    """
+    xyz = points.xyz
+    few = _evenly(xyz, params.thin_m)
+    if len(few) < MIN_POINTS:
+        return _nothing(points)
+    grain = thinning.grain(few, np.random.default_rng(params.seed))
+    cell = 2 * max(params.thin_m, grain.spacing)
+    tolerance = params.tolerance_m or float(np.clip(4 * grain.noise, 0.03, 0.1))
+    labels = _search_tiles(few, tolerance, cell, params)
+    labels = patches.merge_coplanar(few, labels, tolerance, cell)
+    if labels.max(initial=-1) < 0:
+        return _nothing(points)
+    return _label_all(points, few, labels, tolerance, cell, params.tile_m)
+
+
+def _evenly(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.float32]:
+    """Return the building's points, thinned to an even density."""
+    if len(xyz) < MIN_POINTS:
+        return xyz
+    low, high = thinning.bounds(xyz)
+    if (high - low).max() > WIDE:
+        xyz = xyz[thinning.body(xyz)]
+    return xyz[thinning.thin(xyz, voxel)]
+
+
+def _nothing(points: PointCloud) -> tuple[Planes, PlaneLabels]:
+    none = np.empty(0)
+    planes = Planes(np.empty((0, 3)), none, np.empty(0, np.int64), none, points.origin)
+    return planes, PlaneLabels(np.full(len(points), -1, np.int32))
+
+
+def _search_tiles(
+    xyz: NDArray[np.float32], tolerance: float, cell: float, params: HoughParams
+) -> NDArray[np.int32]:
+    """Return the patch of each thinned point, tile by tile; -1 for none."""
+    low, high = thinning.bounds(xyz)
+    across = np.maximum(1, np.ceil((high - low)[:2] / params.tile_m)).astype(int)
+    size = np.maximum((high - low)[:2] / across, 1e-3)
+    at = np.minimum(((xyz[:, :2] - low[:2]) / size).astype(int), across - 1)
+    tile = at[:, 0] * across[1] + at[:, 1]
+    order = np.argsort(tile, kind="stable")
+    starts = np.searchsorted(tile[order], np.arange(across.prod() + 1))
+    labels = np.full(len(xyz), -1, np.int32)
+    found = 0
+    for t, (a, b) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+        inside = order[a:b]
+        for members in _search(xyz[inside], tolerance, cell, params, params.seed + 7919 * t):
+            labels[inside[members]] = found
+            found += 1
+    return labels
+
+
+def _search(
+    xyz: NDArray[np.float32], tolerance: float, cell: float, params: HoughParams, seed: int
+) -> list[NDArray[np.int64]]:
+    """Return the members of each patch of one tile, in the order found."""
+    if len(xyz) < MIN_POINTS:
+        return []
+    centre = xyz.mean(axis=0)
+    left = np.arange(len(xyz))
+    local = np.ascontiguousarray(xyz - centre)
+    enough = params.left_over * len(xyz)
+    found: list[NDArray[np.int64]] = []
+    state = voting.seed_state(seed)
+    ballot = _Ballot(local, params)
+    for draw in (ballot.anywhere, ballot.nearby):
+        missed = 0
+        while len(left) > max(enough, MIN_POINTS) and missed < params.misses:
+            here = local[left]
+            vote = draw(here, state)
+            if vote is None:
+                break
+            members = _patch(here, vote, tolerance, cell, params)
+            if members is None:
+                missed += 1
+                continue
+            missed = 0
+            found.append(left[members[0]])
+            left = left[~members[1]]
+    return found
+
+
+def _patch(
+    xyz: NDArray[np.float32],
+    vote: tuple[NDArray[np.float64], float],
+    tolerance: float,
+    cell: float,
+    params: HoughParams,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
+    """Return (inliers, points to remove) of the patch a vote stands for, None if it is none.
+
+    What is removed reaches half a tolerance further than the inliers, or the rim would be found
+    again as a plane of its own.
+    """
+    near = _within(xyz, *vote, 2 * tolerance)
+    if near.sum() < MIN_POINTS:
+        return None
+    normal, offset = patches.fit_plane(xyz[near])
+    near = np.flatnonzero(_within(xyz, normal, offset, tolerance))
+    if len(near) < MIN_POINTS:
+        return None
+    inside, area = patches.largest_cluster(xyz[near], normal, cell)
+    if area < params.min_area_m2 or inside.sum() < MIN_POINTS:
+        return None
+    normal, offset = patches.fit_plane(xyz[near[inside]])
+    wide = np.flatnonzero(_within(xyz, normal, offset, 1.5 * tolerance))
+    if len(wide) < MIN_POINTS:
+        return None
+    cluster, _ = patches.largest_cluster(xyz[wide], normal, cell)
+    remove = np.zeros(len(xyz), bool)
+    remove[wide[cluster]] = True
+    keep = remove & _within(xyz, normal, offset, tolerance)
+    return (keep, remove) if keep.any() else None
+
+
+def _within(
+    xyz: NDArray[np.float32], normal: NDArray[np.float64], offset: float, distance: float
+) -> NDArray[np.bool_]:
+    return np.abs(xyz @ normal.astype(np.float32) - np.float32(offset)) < distance
+
+
+class _Ballot:
+    """One tile's accumulator and its two ways to draw."""
+
+    def __init__(self, xyz: NDArray[np.float32], params: HoughParams) -> None:
+        self.params = params
+        self.low = xyz.min(axis=0) - np.float32(1e-3)
+        self.extent = xyz.max(axis=0) - self.low
+        ball = voting.make_ball(params.cell_angle_rad)
+        rho_cells = int(np.linalg.norm(xyz, axis=1).max() / params.cell_offset_m) + 2
+        self.cells = (ball.cells_of_row, ball.first_of_row, rho_cells, 1 / params.cell_offset_m)
+        self.accumulator = np.zeros(int(ball.first_of_row[-1]) * rho_cells, np.uint16)
+        self.log = (np.empty(voting.LOG, np.int64), np.empty((voting.LOG, 4), np.float32))
+
+    def anywhere(
+        self, xyz: NDArray[np.float32], state: NDArray[np.uint64]
+    ) -> tuple[NDArray[np.float64], float] | None:
+        """Draw from the whole tile with the wide range of distances."""
+        p = self.params
+        return _plane(
+            voting.vote_anywhere(
+                xyz,
+                p.beta_min,
+                p.beta_max,
+                self.accumulator,
+                *self.cells,
+                p.gamma_cell,
+                p.tries,
+                state,
+                *self.log,
+            )  # fmt: skip
+        )
+
+    def nearby(
+        self, xyz: NDArray[np.float32], state: NDArray[np.uint64]
+    ) -> tuple[NDArray[np.float64], float] | None:
+        """Draw around a point with the narrow range of distances."""
+        p = self.params
+        edge = p.beta_near / 2
+        shape = (self.extent / edge).astype(np.int64) + 1
+        bins, members = voting.fill_bins(xyz, self.low, np.float32(edge), shape)
+        return _plane(
+            voting.vote_nearby(
+                xyz,
+                bins,
+                members,
+                shape,
+                self.low,
+                np.float32(edge),
+                p.beta_min,
+                p.beta_near,
+                self.accumulator,
+                *self.cells,
+                p.gamma_cell,
+                p.tries_near,
+                state,
+                *self.log,
+            )  # fmt: skip
+        )
+
+
+def _plane(
+    vote: tuple[bool, float, float, float, float],
+) -> tuple[NDArray[np.float64], float] | None:
+    found, *normal, offset = vote
+    return (np.array(normal), offset) if found else None
+
+
+def _label_all(
+    points: PointCloud,
+    few: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    tolerance: float,
+    cell: float,
+    tile: float,
+) -> tuple[Planes, PlaneLabels]:
+    """Label all points by the patches of the thinned ones, and fit each plane to its inliers."""
+    m = int(labels.max()) + 1
+    members = [few[i] for i in patches.members(labels)]
+    fits = [patches.fit_plane(xyz) for xyz in members]
+    normals, offsets = np.array([f[0] for f in fits]), np.array([f[1] for f in fits])
+    prints = [patches.footprint(xyz, n, cell) for xyz, n in zip(members, normals, strict=True)]
+    prints = [_dilated(p, 2) for p in prints]
+    every = np.empty(len(points), np.int32)
+    stride = max(1, len(points) // REFIT_POINTS)
+    for xyz in (points.xyz[::stride], points.xyz):
+        hit, sums = _assign(xyz, prints, normals, offsets, tolerance, cell, tile, every)
+        fitted, at, rms = patches.Moments(sums).planes()
+        good = sums[:, 9] >= 3
+        normals = np.where(good[:, None], fitted, normals)
+        offsets = np.where(good, at, offsets)
+        prints = [
+            _dilated(patches.Footprint(p.u, p.v, p.low, h), 1)
+            for p, h in zip(prints, hit, strict=True)
+        ]
+    return _ordered(points, every, normals, offsets, rms, sums[:, 9].astype(np.int64))
+
+
+def _dilated(print_: patches.Footprint, cells: int) -> patches.Footprint:
+    grown = ndimage.binary_dilation(print_.cells, patches.EIGHT, iterations=cells)
+    return patches.Footprint(print_.u, print_.v, print_.low, grown)
+
+
+def _assign(
+    xyz: NDArray[np.float32],
+    prints: list[patches.Footprint],
+    normals: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    tolerance: float,
+    cell: float,
+    tile: float,
+    labels: NDArray[np.int32],
+) -> tuple[list[NDArray[np.bool_]], NDArray[np.float64]]:
+    low, tiles_y, tile_starts, tile_patches = _patches_of_tiles(
+        prints, normals, offsets, cell, tile
+    )
+    shapes = np.array([p.cells.shape for p in prints], np.int64)
+    starts = np.concatenate(([0], np.cumsum(shapes.prod(axis=1))))
+    flat = np.concatenate([p.cells.ravel() for p in prints]).view(np.uint8)
+    hit = np.zeros(len(flat), np.uint8)
+    sums = np.zeros((len(prints), 10))
+    axes = np.array([(p.u, p.v) for p in prints])
+    lows = np.array([p.low for p in prints])
+    patches.assign(
+        xyz, low, tile, tiles_y, tile_starts, tile_patches, normals, offsets, axes, lows, shapes,
+        starts[:-1], flat, hit, tolerance, cell, labels, sums,
+    )  # fmt: skip
+    cut = [
+        hit[a:b].astype(bool).reshape(s)
+        for a, b, s in zip(starts, starts[1:], shapes, strict=False)
+    ]
+    return cut, sums
+
+
+def _patches_of_tiles(
+    prints: list[patches.Footprint],
+    normals: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    cell: float,
+    tile: float,
+) -> tuple[NDArray[np.float64], int, NDArray[np.int64], NDArray[np.int64]]:
+    """Return the tiles' corner, their number along y, and the patches whose box meets each."""
+    boxes = []
+    for p, normal, offset in zip(prints, normals, offsets, strict=True):
+        a, b = np.nonzero(p.cells)
+        ab = [p.low + cell * np.array(corner) for corner in
+              ((a.min(), b.min()), (a.max() + 1, b.min()), (a.min(), b.max() + 1),
+               (a.max() + 1, b.max() + 1))]  # fmt: skip
+        corners = np.array([c[0] * p.u + c[1] * p.v + offset * normal for c in ab])[:, :2]
+        boxes.append((corners.min(axis=0) - cell, corners.max(axis=0) + cell))
+    lows, highs = np.array([b[0] for b in boxes]), np.array([b[1] for b in boxes])
+    low = lows.min(axis=0)
+    first = ((lows - low) / tile).astype(int)
+    last = ((highs - low) / tile).astype(int)
+    tiles = last.max(axis=0) + 1
+    lists: list[list[int]] = [[] for _ in range(int(tiles.prod()))]
+    for p in range(len(prints)):
+        for x in range(first[p, 0], last[p, 0] + 1):
+            for y in range(first[p, 1], last[p, 1] + 1):
+                lists[x * tiles[1] + y].append(p)
+    starts = np.concatenate(([0], np.cumsum([len(one) for one in lists]))).astype(np.int64)
+    return low, int(tiles[1]), starts, np.array([p for one in lists for p in one], np.int64)
+
+
+def _ordered(
+    points: PointCloud,
+    labels: NDArray[np.int32],
+    normals: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    rms: NDArray[np.float64],
+    inliers: NDArray[np.int64],
+) -> tuple[Planes, PlaneLabels]:
+    """Return the patches that kept inliers, most first."""
+    order = np.argsort(-inliers, kind="stable")
+    order = order[inliers[order] >= MIN_POINTS]
+    rank = np.full(len(inliers) + 1, -1, np.int32)  # the last entry serves label -1
+    rank[order] = np.arange(len(order))
+    flip = np.where(offsets[order] < 0, -1.0, 1.0)
+    planes = Planes(
+        normals=normals[order] * flip[:, None],
+        offsets=offsets[order] * flip,
+        inliers=inliers[order],
+        rms=rms[order],
+        origin=points.origin,
+    )
+    return planes, PlaneLabels(rank[labels])

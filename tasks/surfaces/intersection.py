@@ -1,0 +1,277 @@
+"""Plane intersection (Sec. 4.1, Eq. 8): wall faces become rooms, walls and corners.
+
+The paper extends walls until they meet. Here all faces' lines, lengthened, cut the storey into
+cells; a minimum cut tells indoors from outdoors by where floor and ceiling were seen and where
+walls stand; cells between which no wall stands are one room. So a room may have any simple
+polygon, a missing wall is bridged by its neighbours' extensions, and what many scans saw of one
+room makes one room.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from storage.corners import Corners
+from storage.coverage import Coverage
+from storage.faces import SEEN_LOW, SEEN_OVER, SEEN_WALL, Faces
+from storage.rooms import Rooms
+from storage.walls import Walls
+from tasks.params import Params
+from tasks.surfaces import arrangement as cut
+from tasks.surfaces.corners import room_corners
+from tasks.surfaces.directions import face_angles, frames, off_frames
+from tasks.surfaces.outlines import outline_lines
+from tasks.surfaces.pairing import pair_walls
+from tasks.surfaces.partition import indoors, join_open
+
+
+class IntersectParams(Params):
+    """Parameters of plane intersection. None of them is in the paper."""
+
+    min_face_m: PositiveFloat = 0.5
+    """Shortest face that cuts a room, metres."""
+    long_face_m: PositiveFloat = 2.0
+    """Length from which a face cuts at any angle; shorter ones off the storey's directions are
+    open door leaves and cabinets, metres."""
+    extension_m: PositiveFloat = 10.0
+    """How far a wall is extended at most to meet others, metres."""
+    in_line_m: PositiveFloat = 0.06
+    """Faces off each other's line by less share one, metres."""
+    snap_m: NonNegativeFloat = 0.04
+    """A wall takes a direction of the storey if its ends move by less, metres."""
+    thinnest_m: PositiveFloat = 0.04
+    """Thickness of the thinnest wall with two faces, metres."""
+    thickest_m: PositiveFloat = 0.6
+    """Thickness of the thickest wall with two faces, metres."""
+    unseen_cost: PositiveFloat = 0.05
+    """Cost of a square metre indoors that was not seen, against 1 for one outdoors that was."""
+    open_cost: PositiveFloat = 0.4
+    """Cost of a metre of the building's limit on which no wall was seen."""
+    wall_low: float = Field(default=0.3, ge=0, le=1)
+    """How much of a wall is seen where only something lower than a lintel was."""
+    wall_over: float = Field(default=0.4, ge=0, le=1)
+    """How much of a wall is seen where the floor runs on beneath."""
+    unknown_open: float = Field(default=0.35, ge=0, le=1)
+    """How open a place is on which neither a wall was seen nor the floor or ceiling running on."""
+    open_share: float = Field(default=0.3, ge=0, le=1)
+    """Share of their common border from which two cells are one room."""
+    min_area_m2: PositiveFloat = 1.0
+    """Smallest room, square metres."""
+    min_seen: float = Field(default=0.15, ge=0, le=1)
+    """Least share of a room's area that was seen; a fifth of it for one walled on most sides."""
+
+
+OUTSIDE_MARGIN = 0.5
+"""How far the plane reaches beyond what was seen, metres."""
+SLIVER = 0.1
+"""Half the width below which a part of a room is an artefact of nearly equal lines, metres."""
+WALLED = 0.5
+"""Share of the outline from which a hardly seen room is believed."""
+
+
+def intersect_walls(
+    faces: Faces, coverage: Coverage, params: IntersectParams
+) -> tuple[Rooms, Walls, Corners]:
+    """Intersect the wall faces of a storey to its initial model.
+
+    Parameters
+    ----------
+    faces : Faces
+        Wall faces of the storey.
+    coverage : Coverage
+        Where floor and ceiling were seen.
+
+    Returns
+    -------
+    Rooms
+        Simple polygons, disjoint; none if nothing bounds or covers a room.
+    Walls
+        The rooms' walls; two faces of one wall are one wall with a thickness.
+    Corners
+        Lower and upper corners by Cramer's rule.
+    """
+    if not len(coverage):
+        return _empty()
+    faces = _cutting(faces, params)
+    plane = _cut_plane(faces, coverage, params)
+    rooms = _rooms(plane, coverage, params)
+    walls = pair_walls(rooms, faces, params.thinnest_m, params.thickest_m)
+    return rooms, walls, room_corners(rooms, faces)
+
+
+def _empty() -> tuple[Rooms, Walls, Corners]:
+    none = np.empty(0)
+    rooms = Rooms(np.empty(0, object), none, none, none, none, ())
+    pairs = np.empty((0, 2), np.int32)
+    walls = Walls(np.empty((0, 2, 2)), none, none, none, pairs, none)
+    return rooms, walls, Corners(np.empty(0, np.int32), np.empty((0, 3)), np.empty((0, 3)))
+
+
+def _cutting(faces: Faces, params: IntersectParams) -> Faces:
+    """Return the faces that may bound a room."""
+    angles = face_angles(faces)
+    off = np.abs(off_frames(angles, frames(angles, faces.weights)))
+    length = np.linalg.norm(faces.lines[:, 1] - faces.lines[:, 0], axis=1)
+    wall = np.array([(p == SEEN_WALL).sum() * faces.bin_m for p in faces.profiles])
+    aligned = (off < np.radians(5)) | (length > params.long_face_m)
+    keep = np.flatnonzero((length >= params.min_face_m) & (wall >= params.min_face_m / 2) & aligned)
+    return replace(
+        faces,
+        normals=faces.normals[keep],
+        offsets=faces.offsets[keep],
+        sides=faces.sides[keep],
+        lines=faces.lines[keep],
+        heights=faces.heights[keep],
+        weights=faces.weights[keep],
+        scans=faces.scans[keep],
+        profiles=tuple(faces.profiles[i] for i in keep),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """The storey's plane, cut, with what is known of its cells and edges."""
+
+    cells: NDArray[np.object_]
+    areas: NDArray[np.float64]
+    seen: NDArray[np.float64]
+    solid: NDArray[np.float64]
+    left: NDArray[np.int64]
+    right: NDArray[np.int64]
+    lengths: NDArray[np.float64]
+    wall: NDArray[np.float64]
+    open: NDArray[np.float64]
+
+
+def _cut_plane(faces: Faces, coverage: Coverage, params: IntersectParams) -> _Plane:
+    lines = cut.carrier_lines(
+        faces, params.in_line_m, np.radians(2), 3.0, params.snap_m
+    )
+    main = frames(face_angles(faces), faces.weights)
+    lines = _with_outlines(lines, outline_lines(coverage, lines, main))
+    low = coverage.centres().min(axis=0) - OUTSIDE_MARGIN
+    high = coverage.centres().max(axis=0) + OUTSIDE_MARGIN
+    plane = cut.arrange(lines, shapely.box(*low, *high), params.extension_m)
+    worth = np.zeros(4)
+    worth[[SEEN_LOW, SEEN_OVER, SEEN_WALL]] = params.wall_low, params.wall_over, 1.0
+    return _Plane(
+        cells=plane.cells,
+        areas=shapely.area(plane.cells),
+        seen=cut.seen_share(plane, coverage),
+        solid=cut.solid_share(plane, faces, params.thinnest_m, params.thickest_m),
+        left=plane.left,
+        right=plane.right,
+        lengths=np.linalg.norm(plane.edges[:, 1] - plane.edges[:, 0], axis=1),
+        wall=cut.wall_share(plane, lines, faces, 0.1, worth),
+        open=cut.open_share(plane, coverage),
+    )
+
+
+def _with_outlines(
+    lines: cut.Lines,
+    more: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+) -> cut.Lines:
+    normals, offsets, spans = more
+    return cut.Lines(
+        np.vstack([lines.normals, normals]),
+        np.append(lines.offsets, offsets),
+        np.vstack([lines.spans, spans]),
+        lines.of_face,
+    )
+
+
+def _rooms(plane: _Plane, coverage: Coverage, params: IntersectParams) -> Rooms:
+    inside = indoors(
+        outside_cost=plane.areas * plane.seen * (1 - plane.solid),
+        inside_cost=plane.areas * ((1 - plane.seen) * params.unseen_cost + 5 * plane.solid),
+        left=plane.left,
+        right=plane.right,
+        cut_cost=plane.lengths * (params.open_cost * (1 - plane.wall) + 0.02),
+    )
+    through = params.unknown_open + (1 - params.unknown_open) * plane.open
+    room = join_open(
+        inside,
+        plane.left,
+        plane.right,
+        plane.lengths,
+        plane.lengths * (1 - plane.wall) * through,
+        params.open_share,
+    )
+    found = [_room(plane, np.flatnonzero(room == r), params) for r in np.unique(room[room >= 0])]
+    good = [f for f in found if f is not None]
+    good.sort(key=lambda f: (-f[0].area, f[0].bounds))
+    polygons = np.empty(len(good), object)
+    polygons[:] = [shapely.normalize(f[0]) for f in good]
+    return _with_coverage(polygons, np.array([f[1] for f in good]), good, coverage)
+
+
+Found = tuple[shapely.Polygon, float, float]
+
+
+def _room(plane: _Plane, cells: NDArray[np.int64], params: IntersectParams) -> Found | None:
+    """Return (polygon, seen share, walled share) of a group of cells, None if it is no room."""
+    area = plane.areas[cells].sum()
+    if area < params.min_area_m2:
+        return None
+    seen = float(plane.seen[cells] @ plane.areas[cells] / area)
+    member = np.zeros(len(plane.cells) + 1, bool)  # the last entry serves the border's -1
+    member[cells] = True
+    limit = member[plane.left] != member[plane.right]
+    walled = float(plane.wall[limit] @ plane.lengths[limit] / max(plane.lengths[limit].sum(), 1e-9))
+    least = params.min_seen if walled < WALLED else params.min_seen / 5
+    if seen < least:
+        return None
+    polygon = _tidy(shapely.union_all(plane.cells[cells], grid_size=cut.SNAP))
+    return (polygon, seen, walled) if polygon.area >= params.min_area_m2 else None
+
+
+def _tidy(polygon: shapely.Geometry) -> shapely.Polygon:
+    """Return the largest part of a room, without slivers, holes and corners in line."""
+    mitre = {"join_style": "mitre", "mitre_limit": 3.0}
+    opened = polygon.buffer(-SLIVER, **mitre).buffer(SLIVER, **mitre)
+    parts = [p for p in shapely.get_parts(opened) if p.geom_type == "Polygon"]
+    if not parts:
+        return shapely.Polygon()
+    largest = max(parts, key=lambda p: p.area)
+    return shapely.Polygon(largest.exterior).simplify(0.01)
+
+
+def _with_coverage(
+    polygons: NDArray[np.object_],
+    seen: NDArray[np.float64],
+    found: list[Found],
+    coverage: Coverage,
+) -> Rooms:
+    """Look up what the cells of each room say of its heights and of who saw it."""
+    tree = shapely.STRtree(shapely.points(coverage.centres()))
+    starts = np.concatenate(([0], np.cumsum(coverage.scans)))
+    floors, ceilings, scans = [], [], []
+    for polygon in polygons:
+        cells = np.sort(tree.query(polygon, "intersects"))
+        floors.append(_middle(coverage.floor_m[cells]))
+        ceilings.append(_middle(coverage.ceiling_m[cells]))
+        by = [coverage.seen_by[starts[c] : starts[c + 1]] for c in cells]
+        scans.append(_who(np.concatenate([*by, np.empty(0, np.int32)]), len(cells)))
+    return Rooms(
+        polygons=polygons,
+        floor_m=np.array(floors, float),
+        ceiling_m=np.array(ceilings, float),
+        seen=seen,
+        walled=np.array([f[2] for f in found], float),
+        scans=tuple(scans),
+    )
+
+
+def _middle(heights: NDArray[np.float64]) -> float:
+    heights = heights[np.isfinite(heights)]
+    return float(np.median(heights)) if len(heights) else np.nan
+
+
+def _who(scans: NDArray[np.int32], cells: int) -> tuple[int, ...]:
+    """Return the scans that saw at least a twentieth of a room's seen cells: not those that only
+    looked in through the door."""
+    who, counts = np.unique(scans, return_counts=True)
+    return tuple(int(s) for s in who[counts >= 0.05 * cells])

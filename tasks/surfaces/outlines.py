@@ -1,0 +1,87 @@
+"""Lines where the seen floor and ceiling end and no wall was seen: glass, or an unscanned side."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from storage.coverage import Coverage
+from tasks.surfaces.arrangement import Lines, closed
+from tasks.surfaces.directions import off_frames
+
+STRAIGHT = 0.15
+"""How far an outline may wander from a straight line, metres: the raster's own steps."""
+SHORTEST = 0.8
+"""Shortest straight piece that says where a room ends, metres."""
+ALIGNED = np.radians(8)
+"""Outlines turned further from the storey's directions are the shadows of things."""
+BESIDE = 0.4
+"""A piece this near to a wall's line is that wall, metres."""
+
+
+def outline_lines(
+    coverage: Coverage, lines: Lines, main: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return normals (k, 2), offsets (k,) and spans (k, 2) of outlines without a wall."""
+    kept: list[tuple[NDArray[np.float64], float, tuple[float, float]]] = []
+    for a, b in _pieces(coverage):
+        length = float(np.linalg.norm(b - a))
+        if length < SHORTEST:
+            continue
+        angle = np.array([np.arctan2(b[0] - a[0], a[1] - b[1])])
+        off = float(off_frames(angle, main)[0])
+        if abs(off) > ALIGNED:
+            continue
+        normal = np.array([np.cos(angle[0] - off), np.sin(angle[0] - off)])
+        offset = float((a + b) / 2 @ normal)
+        t = np.sort(np.array([a, b]) @ np.array([-normal[1], normal[0]]))
+        if not _beside(normal, offset, t, lines, kept):
+            kept.append((normal, offset, (float(t[0]), float(t[1]))))
+    return (
+        np.array([k[0] for k in kept]).reshape(-1, 2),
+        np.array([k[1] for k in kept], float),
+        np.array([k[2] for k in kept]).reshape(-1, 2),
+    )
+
+
+def _pieces(coverage: Coverage) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Return the straight pieces of the covered area's outlines, longest first."""
+    cells, size = closed(coverage)
+    if not len(cells):
+        return []
+    low = cells.min(axis=0) - 1
+    image = np.zeros(cells.max(axis=0) - low + 2, np.uint8)
+    image[cells[:, 0] - low[0], cells[:, 1] - low[1]] = 1
+    image = cv2.morphologyEx(image, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    contours, _ = cv2.findContours(image, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    pieces = []
+    for contour in contours:
+        corners = cv2.approxPolyDP(contour, STRAIGHT / size, True)[:, 0, ::-1].astype(float)
+        # a contour runs through the outermost cells' centres
+        xy = (corners + low + 0.5) * size
+        pieces += [(p, q) for p, q in zip(xy, np.roll(xy, -1, axis=0), strict=True)]
+    pieces.sort(key=lambda piece: (-float(np.linalg.norm(piece[1] - piece[0])), *piece[0]))
+    return pieces
+
+
+def _beside(
+    normal: NDArray[np.float64],
+    offset: float,
+    t: NDArray[np.float64],
+    lines: Lines,
+    kept: list[tuple[NDArray[np.float64], float, tuple[float, float]]],
+) -> bool:
+    """Whether a line along this piece, at no more than BESIDE from it, is there already."""
+    foot = normal * offset
+    along = np.array([-normal[1], normal[0]])
+    ends = foot + t[:, None] * along
+    known = [
+        *zip(lines.normals, lines.offsets, lines.spans, strict=True),
+        *kept,
+    ]
+    for other, at, span in known:
+        if np.abs(ends @ other - at).max() > BESIDE:
+            continue
+        s = np.sort(ends @ np.array([-other[1], other[0]]))
+        if min(s[1], span[1]) - max(s[0], span[0]) > 0.3 * (s[1] - s[0]):
+            return True
+    return False
