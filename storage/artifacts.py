@@ -134,9 +134,7 @@ def write(kind: Kind[T], value: T, place: Place) -> Ref:
         return Path(place.store) / folder / f"{digest[:24]}.parquet"
 
     path = _put(table, Path(place.store) / folder, target, kind.write_options or {})
-    return Ref(
-        uri=f"{folder}/{path.name}", sha256=digest, rows=table.num_rows, table=kind.table
-    )
+    return Ref(uri=f"{folder}/{path.name}", sha256=digest, rows=table.num_rows, table=kind.table)
 
 
 def replace_table(path: Path, table: pa.Table) -> None:
@@ -186,8 +184,7 @@ def check(ref: Ref, store: Path | str) -> None:
         ) from error
     if found != ref.sha256:
         raise DamagedArtifact(
-            f"{path}: the artifact was changed or cut after it was written; "
-            "run again, it is remade"
+            f"{path}: the artifact was changed or cut after it was written; run again, it is remade"
         )
 
 

@@ -40,7 +40,7 @@ class Coverage:
 
     def centres(self) -> NDArray[np.float64]:
         """Return the cells' centres, (k, 2), metres."""
-        return (self.cells + 0.5) * self.cell_m
+        return (self.cells.astype(np.float64) + 0.5) * self.cell_m
 
 
 SCHEMA = schema(

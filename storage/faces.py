@@ -58,7 +58,11 @@ SCHEMA = schema(
         *(column(name, pa.float64(), about) for name, about in _FLOATS),
         column("side", pa.int8(), "1: a room before it only; 0: either side, or not known"),
         column("scans", pa.int64(), "scans that saw it"),
-        column("profile", pa.binary(), "a byte per bin: 0 not seen, 1 seen low, 2 seen over an opening, 3 wall"),
+        column(
+            "profile",
+            pa.binary(),
+            "a byte per bin: 0 not seen, 1 seen low, 2 seen over an opening, 3 wall",
+        ),
     ],
 )
 

@@ -129,9 +129,7 @@ def from_table(table: pa.Table) -> Segments:
         return np.stack([numbers[n] for n in names], axis=1)
 
     starts = stack("raster_a_m", "raster_b_m")
-    shapes = zip(
-        table["raster_rows"].to_pylist(), table["raster_columns"].to_pylist(), strict=True
-    )
+    shapes = zip(table["raster_rows"].to_pylist(), table["raster_columns"].to_pylist(), strict=True)
     rasters = [
         Raster((float(a), float(b)), _unpack(bits, shape))
         for (a, b), shape, bits in zip(starts, shapes, table["raster"].to_pylist(), strict=True)

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
+from pyarrow import csv
 
 from storage.errors import InputError
 
@@ -16,8 +18,8 @@ BLOCK = 1 << 24
 
 _LONGEST_LINE = 1 << 26
 _COMMENT = re.compile(rb"(?:#|//)[^\n]*")
-_SPACES = bytes.maketrans(b",;\t\r", b"    ")
-_DECIMAL_COMMAS = bytes.maketrans(b",;\t\r", b".   ")
+_SPACES = bytes.maketrans(b",;\t", b"   ")
+_DECIMAL_COMMAS = bytes.maketrans(b",;\t", b".  ")
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,9 @@ def parse(
             f"line {line} has {counts[wrong[0]]} columns, expected {n_columns}",
             "give every line the same columns, or export the file again",
         )
+    table = _columns(text, n_columns, wanted)
+    if table is not None and len(table) == len(lines):
+        return table
     return _numbers(path, text, block.first_line, n_columns, wanted)
 
 
@@ -106,6 +111,31 @@ def _rows_of(text: bytes, limit: int | None) -> tuple[bytes, NDArray[np.int64], 
     if limit is not None and len(lines) == limit and limit > 0:
         text = text[: ends[lines[-1]] + 1]
     return text, lines, counts[lines]
+
+
+def _columns(
+    text: bytes, n_columns: int, wanted: tuple[int, int, int]
+) -> NDArray[np.float64] | None:
+    """Return the wanted columns of rows with single blanks between numbers, None of any others.
+
+    Arrow parses several times faster than NumPy, on all cores and only what is wanted.
+    """
+    names = [str(column) for column in range(n_columns)]
+    chosen = [names[column] for column in wanted]
+    try:
+        table = csv.read_csv(
+            pa.BufferReader(text),
+            csv.ReadOptions(column_names=names),
+            csv.ParseOptions(delimiter=" ", quote_char=False),
+            csv.ConvertOptions(
+                column_types=dict.fromkeys(chosen, pa.float64()),
+                include_columns=chosen,
+                null_values=[],
+            ),
+        )
+    except pa.ArrowInvalid:
+        return None
+    return np.stack([table[name].to_numpy() for name in chosen], axis=1)
 
 
 def _numbers(

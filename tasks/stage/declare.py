@@ -12,10 +12,9 @@ from functools import cache
 from typing import Any
 
 from prefect import Task
-from prefect.client.schemas.objects import TaskRun
+from prefect.client.schemas.objects import State, TaskRun
 from prefect.context import TaskRunContext
 from prefect.futures import PrefectFuture
-from prefect.states import State
 
 from storage.artifacts import Place, Ref, check_name, write
 from tasks.stage import ledger, records
@@ -47,7 +46,7 @@ class Stage:
         """Run the stage here and now, or take its result from the cache."""
         return self._task(place.store)(place, *args, **kwargs)
 
-    def submit(self, place: Place, *args: Any, **kwargs: Any) -> PrefectFuture[Made]:
+    def submit(self, place: Place, *args: Any, **kwargs: Any) -> PrefectFuture[Any]:
         """Hand the stage to the flow's task runner."""
         return self._task(place.store).submit(place, *args, **kwargs)
 

@@ -2,8 +2,9 @@
 
 import contextlib
 from pathlib import Path
+from typing import Any
 
-from prefect.results import ResultRecord
+from prefect.results import ResultRecord  # type: ignore[attr-defined]  # has no public home
 
 from storage.artifacts import Ref, is_sound
 
@@ -26,7 +27,7 @@ def drop_unless_sound(store: str, key: str) -> None:
 
 def _is_sound(path: Path, store: str) -> bool:
     try:
-        result = ResultRecord.deserialize(path.read_bytes()).result
+        result: Any = ResultRecord.deserialize(path.read_bytes()).result
     except Exception:  # whatever Prefect raises on a record that was cut or is another version's
         return False
     refs = result if isinstance(result, list) else [result]

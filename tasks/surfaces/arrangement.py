@@ -36,7 +36,7 @@ class Lines:
 
 
 def carrier_lines(
-    faces: Faces, same_offset: float, same_angle: float, gap: float, snap: float
+    faces: Faces, same_offset: float, same_angle: float, gap: float, snap: float, snap_angle: float
 ) -> Lines:
     """Let faces that are in line, and not far apart along it, share one line.
 
@@ -51,7 +51,9 @@ def carrier_lines(
     gap : float
         Greatest gap between them along the line, metres.
     snap : float
-        A line takes a main direction of the storey if that moves its ends by less, metres.
+        A line takes a main direction of the storey if that moves its ends by less, metres,
+    snap_angle : float
+        or turns it by less, radians.
     """
     k = len(faces)
     flat = faces.normals[:, :2] / np.linalg.norm(faces.normals[:, :2], axis=1, keepdims=True)
@@ -69,7 +71,7 @@ def carrier_lines(
     normals, offsets, spans = np.empty((count, 2)), np.empty(count), np.empty((count, 2))
     for line in range(count):
         members = np.flatnonzero(of_face == line)
-        normals[line], offsets[line] = _common_line(faces, flat, members, main, snap)
+        normals[line], offsets[line] = _common_line(faces, flat, members, main, snap, snap_angle)
         along = np.array([-normals[line, 1], normals[line, 0]])
         t = faces.lines[members] @ along
         spans[line] = t.min(), t.max()
@@ -82,6 +84,7 @@ def _common_line(
     members: NDArray[np.int64],
     main: NDArray[np.float64],
     snap: float,
+    snap_angle: float,
 ) -> tuple[NDArray[np.float64], float]:
     weights = faces.weights[members]
     strongest = members[np.argmax(weights)]
@@ -91,7 +94,7 @@ def _common_line(
     off = float(off_frames(np.array([angle]), main)[0])
     ends = faces.lines[members].reshape(-1, 2)
     reach = np.linalg.norm(ends - ends.mean(axis=0), axis=1).max()
-    if abs(off) * reach < snap:
+    if abs(off) * reach < snap or abs(off) < snap_angle:
         angle -= off
     normal = np.array([np.cos(angle), np.sin(angle)])
     middles = faces.lines[members].mean(axis=1)
@@ -114,11 +117,11 @@ class Arrangement:
     """(m,), line the edge lies on; -1 for the border"""
 
 
-def arrange(lines: Lines, border: shapely.Polygon, extension: float) -> Arrangement:
-    """Cut the border's inside by the lines, each lengthened by `extension` metres."""
+def arrange(lines: Lines, border: shapely.Polygon, extension: NDArray[np.float64]) -> Arrangement:
+    """Cut the border's inside by the lines, each lengthened by its `extension`, (l,) metres."""
     along = lines.along()
     feet = lines.normals * lines.offsets[:, None]
-    ends = lines.spans + np.array([-extension, extension])
+    ends = lines.spans + extension[:, None] * np.array([-1.0, 1.0])
     drawn = shapely.linestrings(feet[:, None] + ends[..., None] * along[:, None])
     drawn = shapely.intersection(drawn, border)
     network = shapely.union_all(np.append(drawn, border.boundary), grid_size=SNAP)
@@ -133,7 +136,9 @@ def _with_edges(cells: NDArray[np.object_], lines: Lines) -> Arrangement:
     same = ring[:-1] == ring[1:]
     pairs = np.concatenate([at[:-1], at[1:]], axis=1)[same]
     owner = ring[:-1][same]
-    swap = (pairs[:, 0] > pairs[:, 2]) | ((pairs[:, 0] == pairs[:, 2]) & (pairs[:, 1] > pairs[:, 3]))
+    swap = (pairs[:, 0] > pairs[:, 2]) | (
+        (pairs[:, 0] == pairs[:, 2]) & (pairs[:, 1] > pairs[:, 3])
+    )
     pairs[swap] = pairs[swap][:, [2, 3, 0, 1]]
     keys, which, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(which.ravel(), kind="stable")
@@ -259,9 +264,7 @@ def solid_share(
     arrangement: Arrangement, faces: Faces, thinnest: float, thickest: float
 ) -> NDArray[np.float64]:
     """Return the share of each cell that lies between the two faces of one wall, (n,)."""
-    solids = [
-        box for i in range(len(faces)) for box in _walls_behind(faces, i, thinnest, thickest)
-    ]
+    solids = [box for i in range(len(faces)) for box in _walls_behind(faces, i, thinnest, thickest)]
     if not solids:
         return np.zeros(len(arrangement.cells))
     union = shapely.union_all(solids, grid_size=SNAP)
@@ -270,9 +273,33 @@ def solid_share(
     return inside / np.maximum(shapely.area(arrangement.cells), SNAP)
 
 
-def _walls_behind(
-    faces: Faces, i: int, thinnest: float, thickest: float
-) -> list[shapely.Polygon]:
+def across_slivers(
+    arrangement: Arrangement, sliver: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the pairs of edges at which two cells face each other across a thin one, (p,) each.
+
+    Two rooms on either side of a wall have no edge in common but where the wall has a gap; the
+    wall between them must count, or the gap would be all their border.
+    """
+    spans = arrangement.edges[:, 1] - arrangement.edges[:, 0]
+    units = spans / np.maximum(np.linalg.norm(spans, axis=1, keepdims=True), 1e-12)
+    sides: dict[int, list[int]] = {}
+    for e in range(len(spans)):
+        a, b = int(arrangement.left[e]), int(arrangement.right[e])
+        if b >= 0 and sliver[a] != sliver[b]:
+            sides.setdefault(a if sliver[a] else b, []).append(e)
+    pairs = [
+        (e, f)
+        for around in sides.values()
+        for i, e in enumerate(around)
+        for f in around[i + 1 :]
+        if abs(units[e] @ units[f]) > 0.98
+    ]
+    table = np.array(pairs, int).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def _walls_behind(faces: Faces, i: int, thinnest: float, thickest: float) -> list[shapely.Polygon]:
     """Return the wall pieces between face i and the faces behind it that look the other way."""
     if not faces.sides[i]:
         return []
@@ -285,7 +312,7 @@ def _walls_behind(
     opposite = (faces.normals @ faces.normals[i] < -0.98) & (faces.sides == 1)
     behind = opposite & (depth.min(axis=1) > thinnest / 2) & (depth.max(axis=1) < thickest)
     pieces = []
-    for j in np.flatnonzero(behind):
+    for j in np.flatnonzero(behind).tolist():
         a, b = np.sort(relative[j] @ along)
         a, b = max(a, 0.0), min(b, length)
         if b - a < 0.1 or depth[j].mean() < thinnest:

@@ -1,5 +1,7 @@
 """Plane filtering (Sec. 4.1, Eq. 5): planes become vertical, horizontal or clutter segments."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -52,16 +54,16 @@ def extract_segments(
     return Segments(
         cell_m=params.cell_m,
         kinds=kinds,
-        normals=np.array([r["normal"] for r in rows]).reshape(-1, 3),
-        offsets=np.array([r["offset"] for r in rows], float),
-        side_known=np.array([r["side_known"] for r in rows], bool),
-        lines=np.array([r["line"] for r in rows], float).reshape(-1, 2, 2),
-        heights=np.array([r["heights"] for r in rows], float).reshape(-1, 2),
-        areas=np.array([r["area"] for r in rows], float),
+        normals=np.array([r.normal for r in rows]).reshape(-1, 3),
+        offsets=np.array([r.offset for r in rows], float),
+        side_known=np.array([r.side_known for r in rows], bool),
+        lines=np.array([r.line for r in rows], float).reshape(-1, 2, 2),
+        heights=np.array([r.heights for r in rows], float).reshape(-1, 2),
+        areas=np.array([r.area for r in rows], float),
         inliers=planes.inliers,
         rms=planes.rms,
-        hulls=tuple(r["hull"] for r in rows),
-        rasters=tuple(r["raster"] for r in rows),
+        hulls=tuple(r.hull for r in rows),
+        rasters=tuple(r.raster for r in rows),
     )
 
 
@@ -72,6 +74,20 @@ def _sensors(points: PointCloud, snapshots: Snapshots) -> NDArray[np.float64] | 
     return snapshots.positions - points.origin
 
 
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """One row of `Segments`."""
+
+    normal: NDArray[np.float64]
+    offset: float
+    side_known: bool
+    line: NDArray[np.float64]
+    heights: NDArray[np.float64]
+    area: float
+    hull: bytes
+    raster: Raster
+
+
 def _segment(
     points: PointCloud,
     planes: Planes,
@@ -80,7 +96,7 @@ def _segment(
     kind: str,
     sensors: NDArray[np.float64] | None,
     params: FilterParams,
-) -> dict[str, object]:
+) -> _Row:
     xyz = points.xyz[inliers].astype(np.float64)
     normal, offset = planes.normals[i], planes.offsets[i]
     known = False
@@ -101,16 +117,16 @@ def _segment(
         start = np.floor(plane_xy.min(axis=0) / params.cell_m) * params.cell_m
     raster = _raster(plane_xy, start, params.cell_m)
     hull = _hull(raster, params)
-    return {
-        "normal": normal,
-        "offset": offset,
-        "side_known": known,
-        "line": line,
-        "heights": heights,
-        "area": hull.area,
-        "hull": shapely.to_wkb(hull),
-        "raster": raster,
-    }
+    return _Row(
+        normal=normal,
+        offset=offset,
+        side_known=known,
+        line=line,
+        heights=heights,
+        area=hull.area,
+        hull=shapely.to_wkb(hull),
+        raster=raster,
+    )
 
 
 def _upright(

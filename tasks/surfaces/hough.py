@@ -8,15 +8,17 @@ which reaches a chair's seat. Patches that a tile's border has cut are joined ag
 points are labelled and every plane is refitted to all its inliers.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, PositiveInt
-from scipy import ndimage
 
 from storage.planes import PlaneLabels, Planes
 from storage.points import PointCloud
 from tasks.params import Params
 from tasks.surfaces import patches, thinning, voting
+from tasks.surfaces.assignment import MIN_POINTS, label_all
 
 
 class HoughParams(Params):
@@ -58,12 +60,8 @@ class HoughParams(Params):
     """Seed of the draws. Not in the paper."""
 
 
-MIN_POINTS = 20
-"""Points below which a patch is an accident."""
 WIDE = 50.0
 """Extent beyond which a cloud may hold more than its storey, metres."""
-REFIT_POINTS = 500_000
-"""Points that settle the planes well enough before all points are labelled."""
 
 
 def detect_planes(points: PointCloud, params: HoughParams) -> tuple[Planes, PlaneLabels]:
@@ -97,7 +95,7 @@ def detect_planes(points: PointCloud, params: HoughParams) -> tuple[Planes, Plan
     labels = patches.merge_coplanar(few, labels, tolerance, cell)
     if labels.max(initial=-1) < 0:
         return _nothing(points)
-    return _label_all(points, few, labels, tolerance, cell, params.tile_m)
+    return label_all(points, few, labels, tolerance, cell, params.tile_m)
 
 
 def _evenly(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.float32]:
@@ -129,7 +127,7 @@ def _search_tiles(
     starts = np.searchsorted(tile[order], np.arange(across.prod() + 1))
     labels = np.full(len(xyz), -1, np.int32)
     found = 0
-    for t, (a, b) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+    for t, (a, b) in enumerate(pairwise(starts)):
         inside = order[a:b]
         for members in _search(xyz[inside], tolerance, cell, params, params.seed + 7919 * t):
             labels[inside[members]] = found
@@ -179,10 +177,10 @@ def _patch(
     What is removed reaches half a tolerance further than the inliers, or the rim would be found
     again as a plane of its own.
     """
-    near = _within(xyz, *vote, 2 * tolerance)
-    if near.sum() < MIN_POINTS:
+    around = _within(xyz, *vote, 2 * tolerance)
+    if around.sum() < MIN_POINTS:
         return None
-    normal, offset = patches.fit_plane(xyz[near])
+    normal, offset = patches.fit_plane(xyz[around])
     near = np.flatnonzero(_within(xyz, normal, offset, tolerance))
     if len(near) < MIN_POINTS:
         return None
@@ -235,7 +233,7 @@ class _Ballot:
                 p.tries,
                 state,
                 *self.log,
-            )  # fmt: skip
+            )
         )
 
     def nearby(
@@ -262,7 +260,7 @@ class _Ballot:
                 p.tries_near,
                 state,
                 *self.log,
-            )  # fmt: skip
+            )
         )
 
 
@@ -271,123 +269,3 @@ def _plane(
 ) -> tuple[NDArray[np.float64], float] | None:
     found, *normal, offset = vote
     return (np.array(normal), offset) if found else None
-
-
-def _label_all(
-    points: PointCloud,
-    few: NDArray[np.float32],
-    labels: NDArray[np.int32],
-    tolerance: float,
-    cell: float,
-    tile: float,
-) -> tuple[Planes, PlaneLabels]:
-    """Label all points by the patches of the thinned ones, and fit each plane to its inliers."""
-    m = int(labels.max()) + 1
-    members = [few[i] for i in patches.members(labels)]
-    fits = [patches.fit_plane(xyz) for xyz in members]
-    normals, offsets = np.array([f[0] for f in fits]), np.array([f[1] for f in fits])
-    prints = [patches.footprint(xyz, n, cell) for xyz, n in zip(members, normals, strict=True)]
-    prints = [_dilated(p, 2) for p in prints]
-    every = np.empty(len(points), np.int32)
-    stride = max(1, len(points) // REFIT_POINTS)
-    for xyz in (points.xyz[::stride], points.xyz):
-        hit, sums = _assign(xyz, prints, normals, offsets, tolerance, cell, tile, every)
-        fitted, at, rms = patches.Moments(sums).planes()
-        good = sums[:, 9] >= 3
-        normals = np.where(good[:, None], fitted, normals)
-        offsets = np.where(good, at, offsets)
-        prints = [
-            _dilated(patches.Footprint(p.u, p.v, p.low, h), 1)
-            for p, h in zip(prints, hit, strict=True)
-        ]
-    return _ordered(points, every, normals, offsets, rms, sums[:, 9].astype(np.int64))
-
-
-def _dilated(print_: patches.Footprint, cells: int) -> patches.Footprint:
-    grown = ndimage.binary_dilation(print_.cells, patches.EIGHT, iterations=cells)
-    return patches.Footprint(print_.u, print_.v, print_.low, grown)
-
-
-def _assign(
-    xyz: NDArray[np.float32],
-    prints: list[patches.Footprint],
-    normals: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    tolerance: float,
-    cell: float,
-    tile: float,
-    labels: NDArray[np.int32],
-) -> tuple[list[NDArray[np.bool_]], NDArray[np.float64]]:
-    low, tiles_y, tile_starts, tile_patches = _patches_of_tiles(
-        prints, normals, offsets, cell, tile
-    )
-    shapes = np.array([p.cells.shape for p in prints], np.int64)
-    starts = np.concatenate(([0], np.cumsum(shapes.prod(axis=1))))
-    flat = np.concatenate([p.cells.ravel() for p in prints]).view(np.uint8)
-    hit = np.zeros(len(flat), np.uint8)
-    sums = np.zeros((len(prints), 10))
-    axes = np.array([(p.u, p.v) for p in prints])
-    lows = np.array([p.low for p in prints])
-    patches.assign(
-        xyz, low, tile, tiles_y, tile_starts, tile_patches, normals, offsets, axes, lows, shapes,
-        starts[:-1], flat, hit, tolerance, cell, labels, sums,
-    )  # fmt: skip
-    cut = [
-        hit[a:b].astype(bool).reshape(s)
-        for a, b, s in zip(starts, starts[1:], shapes, strict=False)
-    ]
-    return cut, sums
-
-
-def _patches_of_tiles(
-    prints: list[patches.Footprint],
-    normals: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    cell: float,
-    tile: float,
-) -> tuple[NDArray[np.float64], int, NDArray[np.int64], NDArray[np.int64]]:
-    """Return the tiles' corner, their number along y, and the patches whose box meets each."""
-    boxes = []
-    for p, normal, offset in zip(prints, normals, offsets, strict=True):
-        a, b = np.nonzero(p.cells)
-        ab = [p.low + cell * np.array(corner) for corner in
-              ((a.min(), b.min()), (a.max() + 1, b.min()), (a.min(), b.max() + 1),
-               (a.max() + 1, b.max() + 1))]  # fmt: skip
-        corners = np.array([c[0] * p.u + c[1] * p.v + offset * normal for c in ab])[:, :2]
-        boxes.append((corners.min(axis=0) - cell, corners.max(axis=0) + cell))
-    lows, highs = np.array([b[0] for b in boxes]), np.array([b[1] for b in boxes])
-    low = lows.min(axis=0)
-    first = ((lows - low) / tile).astype(int)
-    last = ((highs - low) / tile).astype(int)
-    tiles = last.max(axis=0) + 1
-    lists: list[list[int]] = [[] for _ in range(int(tiles.prod()))]
-    for p in range(len(prints)):
-        for x in range(first[p, 0], last[p, 0] + 1):
-            for y in range(first[p, 1], last[p, 1] + 1):
-                lists[x * tiles[1] + y].append(p)
-    starts = np.concatenate(([0], np.cumsum([len(one) for one in lists]))).astype(np.int64)
-    return low, int(tiles[1]), starts, np.array([p for one in lists for p in one], np.int64)
-
-
-def _ordered(
-    points: PointCloud,
-    labels: NDArray[np.int32],
-    normals: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    rms: NDArray[np.float64],
-    inliers: NDArray[np.int64],
-) -> tuple[Planes, PlaneLabels]:
-    """Return the patches that kept inliers, most first."""
-    order = np.argsort(-inliers, kind="stable")
-    order = order[inliers[order] >= MIN_POINTS]
-    rank = np.full(len(inliers) + 1, -1, np.int32)  # the last entry serves label -1
-    rank[order] = np.arange(len(order))
-    flip = np.where(offsets[order] < 0, -1.0, 1.0)
-    planes = Planes(
-        normals=normals[order] * flip[:, None],
-        offsets=offsets[order] * flip,
-        inliers=inliers[order],
-        rms=rms[order],
-        origin=points.origin,
-    )
-    return planes, PlaneLabels(rank[labels])

@@ -42,6 +42,9 @@ class IntersectParams(Params):
     """Faces off each other's line by less share one, metres."""
     snap_m: NonNegativeFloat = 0.04
     """A wall takes a direction of the storey if its ends move by less, metres."""
+    snap_rad: NonNegativeFloat = 0.0175
+    """A wall takes a direction of the storey if it turns by less, radians: one degree, what a
+    hand-held scan is turned by on the whole."""
     thinnest_m: PositiveFloat = 0.04
     """Thickness of the thinnest wall with two faces, metres."""
     thickest_m: PositiveFloat = 0.6
@@ -60,16 +63,20 @@ class IntersectParams(Params):
     """Share of their common border from which two cells are one room."""
     min_area_m2: PositiveFloat = 1.0
     """Smallest room, square metres."""
-    min_seen: float = Field(default=0.15, ge=0, le=1)
+    min_seen: float = Field(default=0.1, ge=0, le=1)
     """Least share of a room's area that was seen; a fifth of it for one walled on most sides."""
 
 
 OUTSIDE_MARGIN = 0.5
 """How far the plane reaches beyond what was seen, metres."""
+OUTLINE_EXTENSION = 1.0
+"""How far an outline without a wall is extended, metres: to the walls beside it, not through the
+storey."""
 SLIVER = 0.1
 """Half the width below which a part of a room is an artefact of nearly equal lines, metres."""
-WALLED = 0.5
-"""Share of the outline from which a hardly seen room is believed."""
+WALLED, UNWALLED = 0.5, 0.25
+"""Share of the outline from which a hardly seen room is believed, and below which half of it must
+have been seen: what lies outside a window has a floor too, but no walls."""
 
 
 def intersect_walls(
@@ -135,6 +142,7 @@ def _cutting(faces: Faces, params: IntersectParams) -> Faces:
 class _Plane:
     """The storey's plane, cut, with what is known of its cells and edges."""
 
+    cut: cut.Arrangement
     cells: NDArray[np.object_]
     areas: NDArray[np.float64]
     seen: NDArray[np.float64]
@@ -148,26 +156,38 @@ class _Plane:
 
 def _cut_plane(faces: Faces, coverage: Coverage, params: IntersectParams) -> _Plane:
     lines = cut.carrier_lines(
-        faces, params.in_line_m, np.radians(2), 3.0, params.snap_m
+        faces, params.in_line_m, np.radians(2), 3.0, params.snap_m, params.snap_rad
     )
     main = frames(face_angles(faces), faces.weights)
+    extension = np.full(len(lines.offsets), params.extension_m)
     lines = _with_outlines(lines, outline_lines(coverage, lines, main))
-    low = coverage.centres().min(axis=0) - OUTSIDE_MARGIN
-    high = coverage.centres().max(axis=0) + OUTSIDE_MARGIN
-    plane = cut.arrange(lines, shapely.box(*low, *high), params.extension_m)
+    short = np.full(len(lines.offsets) - len(extension), OUTLINE_EXTENSION)
+    plane = cut.arrange(lines, _border(coverage, main), np.append(extension, short))
+    solid = cut.solid_share(plane, faces, params.thinnest_m, params.thickest_m)
     worth = np.zeros(4)
     worth[[SEEN_LOW, SEEN_OVER, SEEN_WALL]] = params.wall_low, params.wall_over, 1.0
     return _Plane(
+        cut=plane,
         cells=plane.cells,
         areas=shapely.area(plane.cells),
         seen=cut.seen_share(plane, coverage),
-        solid=cut.solid_share(plane, faces, params.thinnest_m, params.thickest_m),
+        solid=solid,
         left=plane.left,
         right=plane.right,
         lengths=np.linalg.norm(plane.edges[:, 1] - plane.edges[:, 0], axis=1),
         wall=cut.wall_share(plane, lines, faces, 0.1, worth),
         open=cut.open_share(plane, coverage),
     )
+
+
+def _border(coverage: Coverage, main: NDArray[np.float64]) -> shapely.Polygon:
+    """Return the box around all that was seen, along the storey's first direction."""
+    angle = main[0] if len(main) else 0.0
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turned = coverage.centres() @ axes.T
+    low, high = turned.min(axis=0) - OUTSIDE_MARGIN, turned.max(axis=0) + OUTSIDE_MARGIN
+    corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    return shapely.Polygon(corners @ axes)
 
 
 def _with_outlines(
@@ -191,52 +211,71 @@ def _rooms(plane: _Plane, coverage: Coverage, params: IntersectParams) -> Rooms:
         right=plane.right,
         cut_cost=plane.lengths * (params.open_cost * (1 - plane.wall) + 0.02),
     )
-    through = params.unknown_open + (1 - params.unknown_open) * plane.open
-    room = join_open(
-        inside,
-        plane.left,
-        plane.right,
-        plane.lengths,
-        plane.lengths * (1 - plane.wall) * through,
-        params.open_share,
-    )
-    found = [_room(plane, np.flatnonzero(room == r), params) for r in np.unique(room[room >= 0])]
-    good = [f for f in found if f is not None]
+    room = join_open(inside, *_borders(plane, params), params.open_share)
+    groups = [np.flatnonzero(room == r) for r in np.unique(room[room >= 0])]
+    good = [found for cells in groups for found in _rooms_of(plane, cells, params)]
     good.sort(key=lambda f: (-f[0].area, f[0].bounds))
     polygons = np.empty(len(good), object)
     polygons[:] = [shapely.normalize(f[0]) for f in good]
     return _with_coverage(polygons, np.array([f[1] for f in good]), good, coverage)
 
 
+def _borders(
+    plane: _Plane, params: IntersectParams
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return which cells border on each other, along how many metres, and how many are open."""
+    through = params.unknown_open + (1 - params.unknown_open) * plane.open
+    gap = (1 - plane.wall) * through
+    sliver = 2 * plane.areas / shapely.length(plane.cells) < params.thickest_m / 2
+    e, f = cut.across_slivers(plane.cut, sliver)
+    here = np.where(sliver[plane.left[e]], plane.right[e], plane.left[e])
+    there = np.where(sliver[plane.left[f]], plane.right[f], plane.left[f])
+    along = np.minimum(plane.lengths[e], plane.lengths[f])
+    return (
+        np.append(plane.left, here),
+        np.append(plane.right, there),
+        np.append(plane.lengths, along),
+        np.append(plane.lengths * gap, along * np.minimum(gap[e], gap[f])),
+    )
+
+
 Found = tuple[shapely.Polygon, float, float]
 
 
-def _room(plane: _Plane, cells: NDArray[np.int64], params: IntersectParams) -> Found | None:
-    """Return (polygon, seen share, walled share) of a group of cells, None if it is no room."""
-    area = plane.areas[cells].sum()
-    if area < params.min_area_m2:
-        return None
-    seen = float(plane.seen[cells] @ plane.areas[cells] / area)
+def _rooms_of(plane: _Plane, cells: NDArray[np.int64], params: IntersectParams) -> list[Found]:
+    """Return (polygon, seen share, walled share) of each room a group of cells makes.
+
+    Mostly one or none. Slivers between nearly equal lines can hang two rooms together.
+    """
+    if plane.areas[cells].sum() < params.min_area_m2:
+        return []
     member = np.zeros(len(plane.cells) + 1, bool)  # the last entry serves the border's -1
     member[cells] = True
     limit = member[plane.left] != member[plane.right]
     walled = float(plane.wall[limit] @ plane.lengths[limit] / max(plane.lengths[limit].sum(), 1e-9))
-    least = params.min_seen if walled < WALLED else params.min_seen / 5
-    if seen < least:
-        return None
-    polygon = _tidy(shapely.union_all(plane.cells[cells], grid_size=cut.SNAP))
-    return (polygon, seen, walled) if polygon.area >= params.min_area_m2 else None
+    least = _least_seen(walled, params)
+    found = []
+    for polygon in _tidy(shapely.union_all(plane.cells[cells], grid_size=cut.SNAP)):
+        inside = cells[shapely.intersects(polygon, shapely.point_on_surface(plane.cells[cells]))]
+        seen = float(plane.seen[inside] @ plane.areas[inside] / polygon.area)
+        if polygon.area >= params.min_area_m2 and seen >= least:
+            found.append((polygon, min(seen, 1.0), walled))
+    return found
 
 
-def _tidy(polygon: shapely.Geometry) -> shapely.Polygon:
-    """Return the largest part of a room, without slivers, holes and corners in line."""
+def _least_seen(walled: float, params: IntersectParams) -> float:
+    """Return how much of a room must have been seen, given how much of its outline is walled."""
+    if walled < UNWALLED:
+        return max(params.min_seen, 0.5)
+    return params.min_seen if walled < WALLED else params.min_seen / 5
+
+
+def _tidy(polygon: shapely.Geometry) -> list[shapely.Polygon]:
+    """Return the parts of a room without slivers, holes and corners in line."""
     mitre = {"join_style": "mitre", "mitre_limit": 3.0}
     opened = polygon.buffer(-SLIVER, **mitre).buffer(SLIVER, **mitre)
-    parts = [p for p in shapely.get_parts(opened) if p.geom_type == "Polygon"]
-    if not parts:
-        return shapely.Polygon()
-    largest = max(parts, key=lambda p: p.area)
-    return shapely.Polygon(largest.exterior).simplify(0.01)
+    parts = [p for p in shapely.get_parts(opened) if p.geom_type == "Polygon" and p.area > 0]
+    return [shapely.Polygon(p.exterior).simplify(0.01) for p in parts]
 
 
 def _with_coverage(

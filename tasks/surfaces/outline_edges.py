@@ -48,7 +48,9 @@ def _faces_of(
         return np.full(len(edges), -1)
     flat = faces.normals[:, :2] / np.linalg.norm(faces.normals[:, :2], axis=1, keepdims=True)
     starts = faces.lines[:, 0]
-    away = np.abs(np.einsum("epx,fx->efp", edges, flat) - np.einsum("fx,fx->f", starts, flat)[:, None])
+    away = np.abs(
+        np.einsum("epx,fx->efp", edges, flat) - np.einsum("fx,fx->f", starts, flat)[:, None]
+    )
     facing = outward @ flat.T  # a face looks into its room
     fits = (away.max(axis=2) < ON_FACE) & np.where(faces.sides == 1, facing < 0, True)
     along = np.column_stack((-flat[:, 1], flat[:, 0]))
@@ -60,7 +62,9 @@ def _faces_of(
     return np.where(np.isfinite(common[np.arange(len(edges)), best]), best, -1)
 
 
-def seen_along(edges: NDArray[np.float64], face: NDArray[np.int64], faces: Faces) -> NDArray[np.float64]:
+def seen_along(
+    edges: NDArray[np.float64], face: NDArray[np.int64], faces: Faces
+) -> NDArray[np.float64]:
     """Return the share of each edge along which its face was seen, (e,)."""
     shares = np.zeros(len(edges))
     for e in np.flatnonzero(face >= 0):

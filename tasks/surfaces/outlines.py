@@ -10,7 +10,7 @@ from tasks.surfaces.directions import off_frames
 
 STRAIGHT = 0.15
 """How far an outline may wander from a straight line, metres: the raster's own steps."""
-SHORTEST = 0.8
+SHORTEST = 1.5
 """Shortest straight piece that says where a room ends, metres."""
 ALIGNED = np.radians(8)
 """Outlines turned further from the storey's directions are the shadows of things."""
@@ -23,7 +23,7 @@ def outline_lines(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return normals (k, 2), offsets (k,) and spans (k, 2) of outlines without a wall."""
     kept: list[tuple[NDArray[np.float64], float, tuple[float, float]]] = []
-    for a, b in _pieces(coverage):
+    for a, b in [*_pieces(coverage), *_limits(coverage, main)]:
         length = float(np.linalg.norm(b - a))
         if length < SHORTEST:
             continue
@@ -43,15 +43,40 @@ def outline_lines(
     )
 
 
-def _pieces(coverage: Coverage) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Return the straight pieces of the covered area's outlines, longest first."""
+Piece = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def _image(coverage: Coverage) -> tuple[NDArray[np.uint8], NDArray[np.int64], float]:
+    """Return the covered area as an image without stray cells, its low corner and cell size."""
     cells, size = closed(coverage)
-    if not len(cells):
-        return []
     low = cells.min(axis=0) - 1
     image = np.zeros(cells.max(axis=0) - low + 2, np.uint8)
     image[cells[:, 0] - low[0], cells[:, 1] - low[1]] = 1
-    image = cv2.morphologyEx(image, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    opened = cv2.morphologyEx(image, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return np.asarray(opened, np.uint8), low, size
+
+
+def _limits(coverage: Coverage, main: NDArray[np.float64]) -> list[Piece]:
+    """Return the four sides of the covered area's box, along the storey's first direction.
+
+    The largest covered area only: what was seen apart from it was seen through doors.
+    """
+    image, low, size = _image(coverage)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(image, connectivity=8)
+    if count < 2:
+        return []
+    largest = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+    angle = main[0] if len(main) else 0.0
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    xy = (np.argwhere(labels == largest) + low + 0.5) * size @ axes.T
+    (u0, v0), (u1, v1) = xy.min(axis=0), xy.max(axis=0)
+    corners = np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)]) @ axes
+    return [(p, q) for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+
+
+def _pieces(coverage: Coverage) -> list[Piece]:
+    """Return the straight pieces of the covered area's outlines, longest first."""
+    image, low, size = _image(coverage)
     contours, _ = cv2.findContours(image, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     pieces = []
     for contour in contours:

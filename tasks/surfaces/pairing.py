@@ -78,9 +78,7 @@ def _rest(length: float, taken: list[tuple[float, float]]) -> list[tuple[float, 
     return rest
 
 
-def _walls(
-    pieces: list[tuple[NDArray[np.float64], float, int, int, float]], rooms: Rooms
-) -> Walls:
+def _walls(pieces: list[tuple[NDArray[np.float64], float, int, int, float]], rooms: Rooms) -> Walls:
     pairs = np.array([(p[2], p[3]) for p in pieces], np.int32).reshape(-1, 2)
     return Walls(
         lines=np.array([p[0] for p in pieces]).reshape(-1, 2, 2),

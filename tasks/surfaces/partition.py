@@ -61,7 +61,7 @@ def join_open(
     open_length: NDArray[np.float64],
     open_share: float,
 ) -> NDArray[np.int64]:
-    """Join cells into rooms over the edges no wall stands on, the most open borders first.
+    """Join cells into rooms over the borders no wall stands on, the most open borders first.
 
     Two regions are joined while the open share of their whole common border exceeds
     `open_share`: a doorway does not join two rooms, and a gap in a wall's scan does not either.
@@ -71,9 +71,9 @@ def join_open(
     members : (n,) bool
         Cells that take part.
     left, right : (m,) int
-        The cells an edge lies between, -1 for none.
+        The cells a border lies between, -1 for none.
     length, open_length : (m,) float
-        Length of each edge, and how much of it has no wall, metres.
+        Length of each border, and how much of it has no wall, metres.
 
     Returns
     -------

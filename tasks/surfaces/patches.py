@@ -1,8 +1,8 @@
 """Connected patches of planes: fitting, clustering, merging, and the labels of all points."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -112,7 +112,7 @@ def merge_coplanar(
     first, second = np.nonzero(np.triu(candidates, 1))
     joined = [
         (i, j)
-        for i, j in zip(first, second, strict=True)
+        for i, j in zip(first.tolist(), second.tolist(), strict=True)
         if _one_plane(xyz, patch[i], patch[j], normals, offsets, i, j, tolerance)
         and _touch(xyz, patch[i], patch[j], normals[i], cell)
     ]
@@ -153,7 +153,7 @@ def members(labels: NDArray[np.int32]) -> list[NDArray[np.int64]]:
     """Return the indices of the points of each label from 0 on."""
     order = np.argsort(labels, kind="stable")
     starts = np.searchsorted(labels[order], np.arange(labels.max(initial=-1) + 2))
-    return [order[a:b] for a, b in zip(starts[:-1], starts[1:], strict=True)]
+    return [order[a:b] for a, b in pairwise(starts)]
 
 
 def _groups(m: int, joined: list[tuple[int, int]]) -> NDArray[np.int64]:
@@ -168,91 +168,3 @@ def _relabel(labels: NDArray[np.int32], groups: NDArray[np.int64]) -> NDArray[np
     rank = np.empty(len(sizes), np.int32)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
     return np.where(grouped >= 0, rank[grouped], -1).astype(np.int32)
-
-
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """Sums over the inliers of m planes, from which a least-squares plane follows."""
-
-    sums: NDArray[np.float64]
-    """(m, 10): x, y, z, xx, yy, zz, xy, xz, yz, count"""
-
-    def planes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return normals (m, 3), offsets (m,) and rms distances (m,) of the fitted planes."""
-        s = self.sums
-        count = np.maximum(s[:, 9], 1)
-        centre = s[:, :3] / count[:, None]
-        scatter = s[:, [3, 6, 7, 6, 4, 8, 7, 8, 5]].reshape(-1, 3, 3) / count[:, None, None]
-        scatter = scatter - centre[:, :, None] * centre[:, None, :]
-        values, vectors = np.linalg.eigh(scatter)
-        normals = vectors[:, :, 0]
-        offsets = np.einsum("ij,ij->i", normals, centre)
-        return normals, offsets, np.sqrt(np.maximum(values[:, 0], 0))
-
-
-@dataclass(frozen=True, eq=False)
-class PatchGrid:
-    """Footprints of all patches in flat arrays, and which patches reach into which tile."""
-
-    normals: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    """(m, 2, 3): u and v of each patch"""
-    lows: NDArray[np.float64]
-    """(m, 2)"""
-    shapes: NDArray[np.int64]
-    """(m, 2)"""
-    starts: NDArray[np.int64]
-    """(m,), where a patch's cells begin in `cells`"""
-    cells: NDArray[np.uint8]
-    tile_starts: NDArray[np.int64]
-    tile_patches: NDArray[np.int64]
-    """patches of tile t: `tile_patches[tile_starts[t]:tile_starts[t + 1]]`"""
-
-
-@nb.njit(cache=True, nogil=True)
-def assign(
-    xyz, low, tile, tiles_y, tile_starts, tile_patches, normals, offsets, axes, lows, shapes,
-    starts, cells, hit, tolerance, cell, labels, sums,
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Label every point with the nearest plane whose footprint holds it, in one pass.
-
-    Fills `labels` (n,), `hit` (the footprint cells that got a point) and `sums` (m, 10).
-    """
-    tiles_x = (tile_starts.size - 1) // tiles_y
-    for i in range(xyz.shape[0]):
-        x, y, z = np.float64(xyz[i, 0]), np.float64(xyz[i, 1]), np.float64(xyz[i, 2])
-        tx, ty = int((x - low[0]) / tile), int((y - low[1]) / tile)
-        labels[i] = -1
-        if tx < 0 or ty < 0 or tx >= tiles_x or ty >= tiles_y:
-            continue
-        t = tx * tiles_y + ty
-        best, chosen, where = tolerance, -1, 0
-        for q in range(tile_starts[t], tile_starts[t + 1]):
-            p = tile_patches[q]
-            away = abs(x * normals[p, 0] + y * normals[p, 1] + z * normals[p, 2] - offsets[p])
-            if away >= best:
-                continue
-            u = x * axes[p, 0, 0] + y * axes[p, 0, 1] + z * axes[p, 0, 2] - lows[p, 0]
-            v = x * axes[p, 1, 0] + y * axes[p, 1, 1] + z * axes[p, 1, 2] - lows[p, 1]
-            a, b = int(u / cell), int(v / cell)
-            if u < 0 or v < 0 or a >= shapes[p, 0] or b >= shapes[p, 1]:
-                continue
-            at = starts[p] + a * shapes[p, 1] + b
-            if cells[at]:
-                best, chosen, where = away, p, at
-        if chosen < 0:
-            continue
-        labels[i] = chosen
-        hit[where] = 1
-        s = sums[chosen]
-        s[0] += x
-        s[1] += y
-        s[2] += z
-        s[3] += x * x
-        s[4] += y * y
-        s[5] += z * z
-        s[6] += x * y
-        s[7] += x * z
-        s[8] += y * z
-        s[9] += 1

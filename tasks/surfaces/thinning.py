@@ -93,7 +93,7 @@ def thin(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
 
 
 @nb.njit(cache=True, nogil=True)
-def _bounds(xyz):  # type: ignore[no-untyped-def]
+def _bounds(xyz):
     low, high = xyz[0].copy(), xyz[0].copy()
     for i in range(1, xyz.shape[0]):
         for axis in range(3):
@@ -106,7 +106,7 @@ def _bounds(xyz):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(inline="always")
-def _voxel_of(xyz, i, low, inverse, shape):  # type: ignore[no-untyped-def]
+def _voxel_of(xyz, i, low, inverse, shape):
     x = min(np.int64((xyz[i, 0] - low[0]) * inverse), shape[0] - 1) + 1
     y = min(np.int64((xyz[i, 1] - low[1]) * inverse), shape[1] - 1) + 1
     z = min(np.int64((xyz[i, 2] - low[2]) * inverse), shape[2] - 1) + 1
@@ -114,7 +114,7 @@ def _voxel_of(xyz, i, low, inverse, shape):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _one_of_each(xyz, low, inverse, shape, counts):  # type: ignore[no-untyped-def]
+def _one_of_each(xyz, low, inverse, shape, counts):
     occupied = 0
     for i in range(xyz.shape[0]):
         x, y, z = _voxel_of(xyz, i, low, inverse, shape)
@@ -170,7 +170,7 @@ def grain(xyz: NDArray[np.float32], rng: np.random.Generator) -> Grain:
 
 
 def _around(xyz: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return the points near some places: a tree over a whole storey would cost more than it says."""
+    """Return the points near some places: a tree over all would cost more than it says."""
     if len(xyz) <= WHOLE:
         return np.arange(len(xyz))
     near = np.zeros(len(xyz), bool)

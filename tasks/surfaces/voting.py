@@ -41,7 +41,7 @@ def make_ball(cell_rad: float) -> Ball:
 
 
 @nb.njit(cache=True, nogil=True)
-def seed_state(seed):  # type: ignore[no-untyped-def]
+def seed_state(seed):
     """Return the state of the draws' generator for a seed (splitmix64, never zero)."""
     z = np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -52,7 +52,7 @@ def seed_state(seed):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(inline="always")
-def _below(state, n):  # type: ignore[no-untyped-def]
+def _below(state, n):
     """Draw an integer in [0, n) (xorshift64)."""
     x = state[0]
     x ^= x << np.uint64(13)
@@ -63,7 +63,7 @@ def _below(state, n):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(inline="always")
-def _in_range(xyz, i, j, low2, high2):  # type: ignore[no-untyped-def]
+def _in_range(xyz, i, j, low2, high2):
     dx = xyz[i, 0] - xyz[j, 0]
     dy = xyz[i, 1] - xyz[j, 1]
     dz = xyz[i, 2] - xyz[j, 2]
@@ -72,7 +72,7 @@ def _in_range(xyz, i, j, low2, high2):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(inline="always")
-def _plane_through(xyz, i, j, k):  # type: ignore[no-untyped-def]
+def _plane_through(xyz, i, j, k):
     """Return (nx, ny, nz, rho) with rho >= 0; the normal is zero if the points are on a line."""
     ux, uy, uz = xyz[j, 0] - xyz[i, 0], xyz[j, 1] - xyz[i, 1], xyz[j, 2] - xyz[i, 2]
     vx, vy, vz = xyz[k, 0] - xyz[i, 0], xyz[k, 1] - xyz[i, 1], xyz[k, 2] - xyz[i, 2]
@@ -88,7 +88,7 @@ def _plane_through(xyz, i, j, k):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(inline="always")
-def _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre):  # type: ignore[no-untyped-def]
+def _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre):
     rows = cells_of_row.size
     polar = np.arccos(min(np.float32(1), max(np.float32(-1), nz)))
     row = min(np.int64(polar * rows / np.pi), rows - 1)
@@ -101,7 +101,7 @@ def _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre):
 def vote_anywhere(
     xyz, beta_min, beta_max, accumulator, cells_of_row, first_of_row, rho_cells, per_metre,
     gamma_cell, tries, state, touched, votes,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Draw triplets from the whole cloud until one cell is full.
 
     Returns (found, nx, ny, nz, rho): the mean of the full cell's votes.
@@ -138,7 +138,7 @@ def vote_anywhere(
 def vote_nearby(
     xyz, bins, members, shape, low, edge, beta_min, beta_max, accumulator, cells_of_row,
     first_of_row, rho_cells, per_metre, gamma_cell, tries, state, touched, votes,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Like `vote_anywhere`, but the second and third point come from bins around the first.
 
     A patch with a thousandth of the points is met by a billionth of the triplets drawn anywhere,
@@ -174,7 +174,7 @@ def vote_nearby(
 
 
 @nb.njit(inline="always")
-def _neighbour(xyz, i, bins, members, shape, low, edge, reach, low2, high2, state):  # type: ignore[no-untyped-def]
+def _neighbour(xyz, i, bins, members, shape, low, edge, reach, low2, high2, state):
     """Draw a point of a bin around point i at a distance in range; -1 if eight draws miss."""
     bx = np.int64((xyz[i, 0] - low[0]) / edge)
     by = np.int64((xyz[i, 1] - low[1]) / edge)
@@ -196,7 +196,7 @@ def _neighbour(xyz, i, bins, members, shape, low, edge, reach, low2, high2, stat
 
 
 @nb.njit(cache=True, nogil=True)
-def fill_bins(xyz, low, edge, shape):  # type: ignore[no-untyped-def]
+def fill_bins(xyz, low, edge, shape):
     """Return (bins, members): points of bin b are `members[bins[b]:bins[b + 1]]`."""
     n = xyz.shape[0]
     where = np.empty(n, np.int64)
@@ -218,7 +218,7 @@ def fill_bins(xyz, low, edge, shape):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(inline="always")
-def _mean_vote(cell, logged, accumulator, touched, votes):  # type: ignore[no-untyped-def]
+def _mean_vote(cell, logged, accumulator, touched, votes):
     sx = sy = sz = sr = 0.0
     count = 0
     for q in range(logged):
@@ -234,6 +234,6 @@ def _mean_vote(cell, logged, accumulator, touched, votes):  # type: ignore[no-un
 
 
 @nb.njit(inline="always")
-def _clear(logged, accumulator, touched):  # type: ignore[no-untyped-def]
+def _clear(logged, accumulator, touched):
     for q in range(logged):
         accumulator[touched[q]] = 0

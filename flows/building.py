@@ -1,0 +1,32 @@
+"""Map every storey of a building; one broken storey stops no other."""
+
+from typing import Any
+
+from prefect import flow
+from prefect.states import Failed
+
+from flows.request import StoreyRequest
+from flows.storey import map_storey, threads
+
+
+@flow(name="building", flow_run_name="{building}")
+def map_building(building: str, storeys: list[StoreyRequest], jobs: int | None = None) -> Any:
+    """Map the storeys one after the other; failed if any of them did.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Stages that run at once; None: one per processor.
+    """
+    mapping: Any = map_storey if jobs is None else with_jobs(jobs)
+    states = {request.storey: mapping(request, return_state=True) for request in storeys}
+    failed = {storey: s.message for storey, s in states.items() if not s.is_completed()}
+    if failed:
+        reasons = "; ".join(f"{storey}: {message}" for storey, message in failed.items())
+        return Failed(message=f"{len(failed)} of {len(states)} storeys failed: {reasons}")
+    return {storey: state.result() for storey, state in states.items()}
+
+
+def with_jobs(jobs: int) -> Any:
+    """Return the storey's flow with its own number of stages at once."""
+    return map_storey.with_options(task_runner=threads(jobs))

@@ -1,0 +1,192 @@
+"""The `mapsense` command: one verb per thing people do.
+
+Only light modules are imported here: what a verb needs, it imports when it runs, so that help
+answers at once.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import App, CycloptsError, Parameter
+
+from flows.server import quiet
+from storage.errors import MapSenseError
+
+app = App(
+    name="mapsense",
+    help="Crowd-sourced indoor 3D scans in, accurate indoor models out.",
+    help_format="markdown",
+    version_flags=["--version"],
+)
+
+Store = Annotated[
+    Path | None, Parameter(help="Folder of everything that is kept. [default: mapsense-store]")
+]
+Json = Annotated[bool, Parameter(negative=(), help="Answer as JSON.")]
+Jobs = Annotated[int | None, Parameter(help="Stages that run at once. [default: processors]")]
+Debug = Annotated[bool, Parameter(negative=(), help="Show where an error came from.")]
+Verbose = Annotated[bool, Parameter(negative=(), help="Show what Prefect logs.")]
+Set = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--set",
+        negative=(),
+        help="A parameter of a stage, as hough.gamma_cell=25; repeatable.",
+    ),
+]
+
+
+@app.command(name="map")
+def map_(
+    *scans: Annotated[Path, Parameter(help="Scan files, scan folders, or folders of scans.")],
+    building: Annotated[str, Parameter(help="Name of the building.")],
+    storey: Annotated[str, Parameter(help="Name of the storey.")],
+    store: Store = None,
+    out: Annotated[
+        Path | None, Parameter(help="Folder of the results. [default: in the store]")
+    ] = None,
+    set_: Set = None,
+    up: Annotated[
+        str | None, Parameter(help="The files' up: x, -x, y, -y, z, -z or a,b,c.")
+    ] = None,
+    scale: Annotated[float | None, Parameter(help="Metres per unit of the files.")] = None,
+    crop: Annotated[
+        str | None, Parameter(help="Box to keep: xmin,ymin,zmin,xmax,ymax,zmax, metres.")
+    ] = None,
+    jobs: Jobs = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Map the scans of one storey: its rooms and walls as a plan and drawings.
+
+    Example:
+
+        mapsense map scans/level2 --building library --storey 2 --out library-2
+    """
+    if not scans:
+        raise MapSenseError("no scan named: mapsense map SCAN... --building B --storey S")
+    own: dict[str, Any] = {"up": up, "scale": scale, "crop": crop.split(",") if crop else None}
+    given = {"scans": {name: value for name, value in own.items() if value is not None}}
+    from flows.verbs import map_scans
+
+    return map_scans(scans, building, storey, store, out, set_ or [], given, jobs, json)
+
+
+@app.command
+def demo(
+    *,
+    out: Annotated[Path, Parameter(help="Folder of the results.")] = Path("demo"),
+    store: Annotated[
+        Path | None, Parameter(help="Folder of everything that is kept. [default: OUT/store]")
+    ] = None,
+    seed: Annotated[int, Parameter(help="Seed of the simulated storey and its scans.")] = 0,
+    jobs: Jobs = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Simulate the scans of a small storey, map them, and compare the rooms with the truth.
+
+    Example:
+
+        mapsense demo --out demo
+    """
+    from flows.verbs import run_demo
+
+    return run_demo(out, store, seed, jobs, json)
+
+
+@app.command
+def query(
+    what: Annotated[str | None, Parameter(help="Name of a query, or SQL.")] = None,
+    /,
+    *,
+    store: Store = None,
+    format: Annotated[
+        Literal["table", "json", "csv", "parquet"], Parameter(help="Form of the answer.")
+    ] = "table",
+    out: Annotated[Path | None, Parameter(help="File of the answer. [default: stdout]")] = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Ask the store: a named query or SQL, read only; without either, list the named ones.
+
+    Example:
+
+        mapsense query stage_times
+
+        mapsense query "select building, storey, count(*) from rooms group by all"
+    """
+    from flows.answers import ask
+
+    return ask(what, store, format, out)
+
+
+@app.command
+def status(
+    *,
+    building: Annotated[str | None, Parameter(help="Only this building.")] = None,
+    storey: Annotated[str | None, Parameter(help="Only this storey.")] = None,
+    store: Store = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Show the last run of each storey: how it ended, what failed and why.
+
+    Example:
+
+        mapsense status --building library
+    """
+    from flows.answers import show_status
+
+    return show_status(building, storey, store, json)
+
+
+@app.command
+def rerun(
+    *,
+    building: Annotated[str | None, Parameter(help="Only this building.")] = None,
+    storey: Annotated[str | None, Parameter(help="Only this storey.")] = None,
+    store: Store = None,
+    jobs: Jobs = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Run again what failed, with the sources and parameters of the last run.
+
+    What was computed before comes from the cache: only what is missing is computed.
+
+    Example:
+
+        mapsense rerun --building library
+    """
+    from flows.verbs import run_again
+
+    return run_again(building, storey, store, jobs, json)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command; leave with 0 only if everything asked for was done."""
+    given = sys.argv[1:] if arguments is None else arguments
+    quiet("--verbose" in given)
+    try:
+        result = app(given, exit_on_error=False, print_error=False, result_action="return_value")
+    except (MapSenseError, CycloptsError) as error:
+        if "--debug" in given:
+            raise
+        print(f"mapsense: {_sentence(error)}", file=sys.stderr)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        print("mapsense: interrupted; run again, what was computed is kept", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.exit(1)
+    sys.exit(result if isinstance(result, int) else 0)
+
+
+def _sentence(error: Exception) -> str:
+    return " ".join(str(error).split())

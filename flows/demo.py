@@ -1,0 +1,70 @@
+"""The demo: a small simulated storey, scanned, mapped, and compared with its truth."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from storage.plan import Plan
+from storage.plan_geojson import write_plan
+from tasks.scans.bundle import write_bundle
+from tasks.simulation.plan import StoreyParams, make_storey
+from tasks.simulation.scans import CampaignParams, simulate_scans
+
+BUILDING, STOREY = "demo", "0"
+
+
+@dataclass(frozen=True)
+class RoomMatch:
+    """A simulated room and what was mapped of it."""
+
+    room: str
+    name: str
+    truth_m2: float
+    mapped_m2: float | None
+    """None if no mapped room overlaps it most"""
+    iou: float
+    """area of the intersection over that of the union; 0 if not mapped"""
+
+    def as_json(self) -> dict[str, str | float | None]:
+        """Return it for a summary."""
+        return asdict(self)
+
+
+def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> Plan:
+    """Simulate a furnished storey and its scans into a folder; return the truth."""
+    truth = make_storey(StoreyParams(seed=seed), BUILDING, STOREY)
+    write_plan(truth, folder / "truth.geojson")
+    for name, cloud, snapshots in simulate_scans(truth, CampaignParams(seed=seed)):
+        write_bundle(folder / "scans" / f"{name}.scan", cloud, snapshots)
+        told(f"simulated scan {name}: {len(cloud):,} points")
+    return truth
+
+
+def compare_rooms(truth: Plan, mapped: Plan) -> list[RoomMatch]:
+    """Match each true room with the mapped room that shares most area with it, each once."""
+    shared = sorted(
+        (
+            (true.polygon.intersection(found.polygon).area, i, j)
+            for i, true in enumerate(truth.rooms)
+            for j, found in enumerate(mapped.rooms)
+        ),
+        reverse=True,
+    )
+    partner: dict[int, tuple[int, float]] = {}
+    taken: set[int] = set()
+    for area, i, j in shared:
+        if area > 0 and i not in partner and j not in taken:
+            partner[i] = (j, area)
+            taken.add(j)
+    return [_match(truth, mapped, i, partner.get(i)) for i in range(len(truth.rooms))]
+
+
+def _match(truth: Plan, mapped: Plan, i: int, partner: tuple[int, float] | None) -> RoomMatch:
+    room = truth.rooms[i]
+    area = room.polygon.area
+    if partner is None:
+        return RoomMatch(room.id, room.name or room.id, round(area, 2), None, 0.0)
+    j, shared = partner
+    found = mapped.rooms[j].polygon.area
+    iou = shared / (area + found - shared)
+    return RoomMatch(room.id, room.name or room.id, round(area, 2), round(found, 2), round(iou, 3))

@@ -1,0 +1,60 @@
+"""The parameters of all stages, each as its own stage declares them."""
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from storage.errors import MapSenseError
+from tasks.params import Params
+from tasks.scans.read import ReadParams
+from tasks.surfaces.filtering import FilterParams
+from tasks.surfaces.hough import HoughParams
+from tasks.surfaces.intersection import IntersectParams
+from tasks.surfaces.label_params import LabelParams
+
+
+class MapSenseParams(Params):
+    """Parameters of mapping a storey. A stage is handed its own part only."""
+
+    scans: ReadParams = ReadParams()
+    """How scans are read."""
+    hough: HoughParams = HoughParams()
+    """Plane detection (Sec. 4.1)."""
+    filter: FilterParams = FilterParams()
+    """Plane filtering (Eq. 5)."""
+    label: LabelParams = LabelParams()
+    """Plane labelling (Eq. 6, 7)."""
+    intersect: IntersectParams = IntersectParams()
+    """Plane intersection (Eq. 8)."""
+
+
+def parse_params(given: Mapping[str, Any]) -> MapSenseParams:
+    """Return the parameters, or raise MapSenseError naming the first one that is wrong."""
+    try:
+        return MapSenseParams.model_validate(given)
+    except ValidationError as error:
+        raise MapSenseError(explain(error, MapSenseParams)) from error
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """Return what is wrong with settings as one sentence, with a suggestion for a wrong name."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"])
+    if first["type"] != "extra_forbidden":
+        return f"setting '{where}' = {first['input']!r}: {first['msg'].lower()}"
+    *parents, name = (str(part) for part in first["loc"])
+    known = list(_at(model, parents).model_fields)
+    close = get_close_matches(name, known, n=1)
+    hint = f"did you mean '{'.'.join([*parents, close[0]])}'" if close else ", ".join(known)
+    return f"unknown setting '{where}': {hint if close else 'there are ' + hint}"
+
+
+def _at(model: type[BaseModel], path: list[str]) -> type[BaseModel]:
+    for name in path:
+        field = model.model_fields.get(name)
+        if field is None or not isinstance(field.annotation, type):
+            return model
+        model = field.annotation
+    return model

@@ -1,0 +1,154 @@
+"""What a run hands over: the plan, its drawings, and a summary of what was used and found."""
+
+import json
+import os
+import uuid
+from collections import defaultdict
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from flows.request import StoreyRequest
+from storage import coverage as stored_coverage
+from storage.errors import StoreError
+from storage.plan import Plan
+from storage.plan_geojson import write_plan
+from storage.runs import COMPLETED, FAILED, PARTIAL
+from storage.scans import Scan
+from storage.stages import StageRow, of_run
+from tasks.exports.coverage import Coverage
+from tasks.exports.drawing import draw_plan
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A scan that was not used, and why."""
+
+    scan: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """What a run has made of a storey."""
+
+    plan: Plan
+    coverage: stored_coverage.Coverage
+    scans: tuple[Scan, ...]
+    rows: dict[str, int]
+    """rows of each table, over all scans"""
+
+
+def write_results(request: StoreyRequest, mapped: Mapped) -> None:
+    """Write the plan and its drawings, each whole or not at all."""
+    folder = request.folder()
+    # the initial model is the final one until the grammar refines it
+    write_plan(mapped.plan, folder / "initial.geojson")
+    write_plan(mapped.plan, folder / "plan.geojson")
+    seen = mapped.coverage
+    drawn = Coverage(seen.centres(), seen.cell_m, seen.scans)
+    token = f".{os.getpid()}-{uuid.uuid4().hex[:8]}"
+    drawings = {folder / f"{token}.{kind}": folder / f"plan.{kind}" for kind in ("svg", "png")}
+    try:
+        draw_plan(mapped.plan, drawn, *drawings)
+        for temporary, target in drawings.items():
+            os.replace(temporary, target)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    finally:
+        for temporary in drawings:
+            temporary.unlink(missing_ok=True)
+
+
+def summarise(
+    request: StoreyRequest,
+    mapped: Mapped | None,
+    skipped: list[Skipped],
+    message: str,
+    started_at: datetime,
+) -> dict[str, Any]:
+    """Return what was used, skipped and found, and what it cost."""
+    return {
+        "building": request.building,
+        "storey": request.storey,
+        "state": state_of(mapped, skipped),
+        "message": message,
+        "simulated": request.simulated,
+        "run": request.run,
+        "used": {
+            "scans": [_scan(scan) for scan in mapped.scans] if mapped else [],
+            "points": sum(scan.points_kept for scan in mapped.scans) if mapped else 0,
+            "params": request.params.model_dump(mode="json"),
+        },
+        "skipped": [{"scan": s.scan, "reason": s.reason} for s in skipped],
+        "found": _found(mapped) if mapped else None,
+        "seconds": round((datetime.now(UTC) - started_at).total_seconds(), 3),
+        "stages": stage_costs(of_run(request.place())),
+        "store": request.store,
+        "out": str(request.folder()),
+    }
+
+
+def state_of(mapped: Mapped | None, skipped: list[Skipped]) -> str:
+    """Return how a run ended."""
+    if mapped is None:
+        return FAILED
+    return PARTIAL if skipped else COMPLETED
+
+
+def write_summary(request: StoreyRequest, summary: dict[str, Any]) -> None:
+    """Write summary.json into the folder of the results."""
+    path = request.folder() / "summary.json"
+    temporary = path.with_name(f".{os.getpid()}-{uuid.uuid4().hex[:8]}.json")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(json.dumps(summary, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise _unwritable(path.parent, error) from error
+
+
+def stage_costs(rows: list[StageRow]) -> dict[str, dict[str, float | int]]:
+    """Return for each stage how often it was computed and cached, and its seconds."""
+    costs: dict[str, dict[str, float | int]] = defaultdict(
+        lambda: {"computed": 0, "cached": 0, "failed": 0, "wall_s": 0.0, "cpu_s": 0.0}
+    )
+    for row in rows:
+        cost = costs[row.stage]
+        cost[row.outcome] += 1
+        cost["wall_s"] = round(cost["wall_s"] + row.wall_s, 3)
+        cost["cpu_s"] = round(cost["cpu_s"] + row.cpu_s, 3)
+    return dict(costs)
+
+
+def _scan(scan: Scan) -> dict[str, Any]:
+    return {
+        "scan": scan.name,
+        "format": scan.format,
+        "points": scan.points_kept,
+        "points_read": scan.points_read,
+        "snapshots": scan.snapshots,
+        "up": scan.up,
+        "scale": scan.scale,
+        "notes": scan.notes,
+    }
+
+
+def _found(mapped: Mapped) -> dict[str, Any]:
+    rooms = mapped.plan.rooms
+    return {
+        "rooms": len(rooms),
+        "walls": len(mapped.plan.walls),
+        "area_m2": round(sum(room.polygon.area for room in rooms), 2),
+        "floor_m": mapped.coverage.floor_level_m,
+        "ceiling_m": mapped.coverage.ceiling_level_m,
+        "rows": mapped.rows,
+    }
+
+
+def _unwritable(folder: Path, error: OSError) -> StoreError:
+    return StoreError(
+        f"{folder}: cannot write the results there ({error.strerror or error}); make the folder "
+        "writable, free space on its disk, or choose another with --out"
+    )

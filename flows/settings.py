@@ -1,0 +1,111 @@
+"""Where things are: mapsense.toml < environment MAPSENSE_* < flags.
+
+    # mapsense.toml
+    store = "/data/mapsense"
+    jobs = 4
+    [params.hough]
+    gamma_cell = 25
+
+The same from the environment: MAPSENSE_STORE=/data/mapsense, MAPSENSE_PARAMS__HOUGH__GAMMA_CELL=25.
+"""
+
+import os
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, PositiveInt, ValidationError
+from pydantic_settings import (
+    BaseSettings,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    SettingsError,
+    TomlConfigSettingsSource,
+)
+
+from storage.errors import MapSenseError
+
+FILE = "mapsense.toml"
+PREFIX = "MAPSENSE_"
+
+
+def default_jobs() -> int:
+    """Return how many stages run at once unless it is set: one per processor we may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Settings(BaseSettings):
+    """What is set outside of a call."""
+
+    model_config = SettingsConfigDict(
+        env_prefix=PREFIX,
+        env_nested_delimiter="__",
+        toml_file=FILE,
+        extra="forbid",
+        frozen=True,
+        use_attribute_docstrings=True,
+    )
+
+    store: Path = Path("mapsense-store")
+    """Folder of everything that is kept."""
+    jobs: PositiveInt = Field(default_factory=default_jobs)
+    """Stages that run at once."""
+    params: dict[str, Any] = {}
+    """Parameters of the stages, by stage: what flags and defaults leave open."""
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Let flags win over the environment, and that over the file."""
+        return init_settings, env_settings, TomlConfigSettingsSource(settings_cls)
+
+
+def load_settings(**flags: Any) -> Settings:
+    """Return the settings; flags that are None leave a setting to the environment and the file.
+
+    Raises
+    ------
+    MapSenseError
+        If a setting is unknown or cannot be understood.
+    """
+    _check_environment()
+    given = {name: value for name, value in flags.items() if value is not None}
+    try:
+        return Settings(**given)
+    except tomllib.TOMLDecodeError as error:
+        raise MapSenseError(f"{Path(FILE).resolve()}: is no TOML ({error})") from error
+    except OSError as error:
+        raise MapSenseError(f"{Path(FILE).resolve()}: cannot be read ({error.strerror})") from error
+    except SettingsError as error:
+        raise MapSenseError(f"environment {PREFIX}*: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            raise MapSenseError(f"{FILE}: {_unknown(name)}") from error
+        raise MapSenseError(
+            f"setting '{name}' = {first['input']!r}: {first['msg'].lower()}"
+        ) from error
+
+
+def _check_environment() -> None:
+    """Refuse unknown MAPSENSE_* variables: pydantic-settings passes over them in silence."""
+    for variable in sorted(os.environ):
+        if variable.upper().startswith(PREFIX):
+            name = variable[len(PREFIX) :].lower().partition("__")[0]
+            if name not in Settings.model_fields:
+                raise MapSenseError(f"environment {variable}: {_unknown(name)}")
+
+
+def _unknown(name: str) -> str:
+    known = list(Settings.model_fields)
+    close = get_close_matches(name, known, n=1)
+    hint = f"did you mean '{close[0]}'" if close else f"there are {', '.join(known)}"
+    return f"unknown setting '{name}': {hint}"

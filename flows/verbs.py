@@ -1,0 +1,216 @@
+"""The verbs of the command line that run flows."""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from flows.answers import print_table, state_now
+from flows.server import prefect_api
+from flows.settings import Settings, load_settings
+from storage.artifacts import check_name
+from storage.errors import MapSenseError, StoreError
+from storage.runs import COMPLETED, Run, goes_on, last_runs, read_runs
+
+
+def map_scans(
+    scans: Sequence[Path],
+    building: str,
+    storey: str,
+    store: Path | None,
+    out: Path | None,
+    assignments: list[str],
+    given: dict[str, Any],
+    jobs: int | None,
+    as_json: bool,
+) -> int:
+    """Map the scans of one storey."""
+    flags = _merged(_assigned(assignments), given)
+    settings = load_settings(store=store, jobs=jobs, params=flags or None)
+    root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
+    for name in (building, storey):
+        _check_name(name)
+    if out is not None:
+        writable(out, "folder of the results", "--out")
+    with prefect_api(root):
+        from flows.params import parse_params
+        from flows.request import StoreyRequest
+        from flows.work import is_done, run_storey
+
+        request = StoreyRequest(
+            store=str(root),
+            building=building,
+            storey=storey,
+            scans=tuple(str(scan.resolve()) for scan in scans),
+            params=parse_params(settings.params),
+            out=str(out.resolve()) if out is not None else None,
+        )
+        summary = run_storey(request, settings.jobs, not as_json)
+    _print_summary(summary, as_json)
+    return 0 if is_done(summary) else 1
+
+
+def run_demo(out: Path, store: Path | None, seed: int, jobs: int | None, as_json: bool) -> int:
+    """Simulate, map and compare a small storey."""
+    out = writable(out, "folder of the results", "--out")
+    settings = load_settings(store=store or out / "store", jobs=jobs)
+    root = writable(settings.store, "store", "--store")
+    with prefect_api(root):
+        from flows import demo
+        from flows.params import parse_params
+        from flows.request import StoreyRequest
+        from flows.work import is_done, run_storey
+        from storage.plan_geojson import read_plan
+
+        truth = demo.simulate(out, seed, lambda line: _tell(line, not as_json))
+        request = StoreyRequest(
+            store=str(root),
+            building=demo.BUILDING,
+            storey=demo.STOREY,
+            scans=(str(out / "scans"),),
+            params=parse_params(settings.params),
+            out=str(out),
+            simulated=True,
+            verb="demo",
+        )
+        summary = run_storey(request, settings.jobs, not as_json)
+        matches = demo.compare_rooms(truth, read_plan(out / "plan.geojson"))
+    summary["rooms"] = [match.as_json() for match in matches]
+    _print_summary(summary, as_json)
+    if not as_json:
+        import pyarrow as pa
+
+        print("\nrooms of the simulated storey, and what was mapped of them (simulated scans):")
+        print_table(pa.Table.from_pylist(summary["rooms"]))
+    return 0 if is_done(summary) else 1
+
+
+def run_again(
+    building: str | None, storey: str | None, store: Path | None, jobs: int | None, as_json: bool
+) -> int:
+    """Run again the storeys whose last run did not do all it was asked for."""
+    settings = load_settings(store=store, jobs=jobs)
+    root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
+    last = last_runs(read_runs(root, building, storey))
+    again = [run for run in last if run.state != COMPLETED and not goes_on(str(root), run)]
+    if not again:
+        if as_json:
+            print("[]")
+        else:
+            print(f"nothing to run again: {_tally(root, last)}")
+        return 0
+    summaries = _run_again(root, again, settings, as_json)
+    if as_json:
+        print(json.dumps(summaries, indent=1, ensure_ascii=False))
+    else:
+        for summary in summaries:
+            _print_summary(summary, as_json=False)
+    return 0 if all(summary["state"] == COMPLETED for summary in summaries) else 1
+
+
+def _run_again(root: Path, runs: list[Run], settings: Settings, as_json: bool) -> list[Any]:
+    with prefect_api(root):
+        from pydantic import ValidationError
+
+        from flows.params import explain
+        from flows.request import StoreyRequest
+        from flows.work import run_buildings
+
+        requests = []
+        for run in runs:
+            asked = {k: v for k, v in run.request().items() if k != "run"}
+            try:
+                # a store may have been moved since
+                requests.append(StoreyRequest.model_validate(asked | {"store": str(root)}))
+            except ValidationError as error:
+                raise MapSenseError(
+                    f"{run.building}/{run.storey}: the last run was asked for something that "
+                    f"is not understood any more ({explain(error, StoreyRequest)}); map it again"
+                ) from error
+        return run_buildings(requests, settings.jobs, not as_json)
+
+
+def _tally(root: Path, last: list[Run]) -> str:
+    states = [state_now(str(root), run) for run in last]
+    counts = [f"{states.count(state)} {state}" for state in sorted(set(states))]
+    return ", ".join(counts) + " storeys" if counts else "no storey was mapped"
+
+
+def _print_summary(summary: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(summary, indent=1, ensure_ascii=False))
+        return
+    name = f"{summary['building']}/{summary['storey']}"
+    if (found := summary.get("found")) is None:
+        print(f"mapsense: {name}: {summary['state']}: {summary['message']}", file=sys.stderr)
+        return
+    used, costs = summary["used"], summary["stages"].values()
+    cached = sum(cost["cached"] for cost in costs)
+    total = cached + sum(cost["computed"] + cost["failed"] for cost in costs)
+    simulated = ", simulated" if summary["simulated"] else ""
+    print(
+        f"{name}: {found['rooms']} rooms, {found['area_m2']} m², {found['walls']} walls from "
+        f"{len(used['scans'])} scans ({used['points']:,} points{simulated}) in "
+        f"{summary['seconds']:.1f} s, {cached} of {total} stages from the cache"
+    )
+    print(f"plan: {summary['out']}/plan.geojson, plan.svg, plan.png")
+    if summary["message"]:
+        print(f"mapsense: {name}: {summary['message']}", file=sys.stderr)
+
+
+def _assigned(assignments: list[str]) -> dict[str, Any]:
+    """Return `hough.gamma_cell=25` and the like as nested parameters."""
+    nested: dict[str, Any] = {}
+    for assignment in assignments:
+        path, found, value = assignment.partition("=")
+        *parents, name = path.strip().split(".")
+        if not found or not parents:
+            raise MapSenseError(
+                f"--set {assignment}: expected STAGE.NAME=VALUE, as hough.gamma_cell=25"
+            )
+        inner = nested
+        for parent in parents:
+            inner = inner.setdefault(parent, {})
+        inner[name] = _value(value)
+    return nested
+
+
+def _value(text: str) -> Any:
+    """Return a value written as JSON, or else the text itself."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    names = {name for name in (*one, *other) if one.get(name) or other.get(name)}
+    return {name: {**one.get(name, {}), **other.get(name, {})} for name in sorted(names)}
+
+
+def _check_name(name: str) -> None:
+    try:
+        check_name(name)
+    except ValueError as error:
+        raise MapSenseError(str(error)) from error
+
+
+def _tell(line: str, wanted: bool) -> None:
+    if wanted and sys.stderr.isatty():
+        print(line, file=sys.stderr)
+
+
+def writable(folder: Path, what: str, flag: str) -> Path:
+    """Return a folder's absolute path after a file was written to it, before any work."""
+    probe = folder / ".mapsense-probe"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink(missing_ok=True)
+    except OSError as error:
+        raise StoreError(
+            f"{folder}: the {what} cannot be written ({error.strerror}); make it writable, or "
+            f"choose another with {flag}"
+        ) from error
+    return folder.resolve()

@@ -1,0 +1,88 @@
+"""Floor and ceiling of a storey (Sec. 4.1, Eq. 6 and 7)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from storage.segments import Segments
+from tasks.surfaces.label_params import LabelParams
+
+LEVEL_STEP = 0.1
+"""Horizontal segments closer than this are of one level, metres."""
+MIXED = 1.0
+"""How far below the highest ceiling a storey's other ceilings may lie, metres."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Heights of a storey's floor and ceiling, metres; None where not seen."""
+
+    floor: float | None
+    ceiling: float | None
+    low_ceiling: float | None
+    """the height nine tenths of the ceiling lie above"""
+
+
+def find_levels(scans: list[Segments], params: LabelParams) -> Levels:
+    """Find floor and ceiling: the lowest and highest level of room extent (Eq. 6, 7).
+
+    A cloud with one level only is asked on which side of it its walls lie.
+    """
+    heights, areas = _horizontals(scans)
+    if not len(heights):
+        return Levels(None, None, None)
+    large = _large_levels(heights, areas, params)
+    floor, ceiling = float(large.min()), float(large.max())
+    if ceiling - floor < params.headroom_m:
+        if _walls_stand_on(scans, floor):
+            return Levels(floor, None, None)
+        return Levels(None, ceiling, ceiling)
+    above = heights > floor + params.headroom_m
+    order = np.argsort(heights[above])
+    share = np.cumsum(areas[above][order]) / areas[above].sum()
+    low = float(heights[above][order][np.searchsorted(share, 0.1)])
+    return Levels(floor, ceiling, low)
+
+
+def _horizontals(scans: list[Segments]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    heights, areas = [], []
+    for scan in scans:
+        flat = scan.of_kind("horizontal")
+        heights.append(scan.heights[flat].mean(axis=1))
+        areas.append(scan.areas[flat])
+    return np.concatenate([*heights, np.empty(0)]), np.concatenate([*areas, np.empty(0)])
+
+
+def _large_levels(
+    heights: NDArray[np.float64], areas: NDArray[np.float64], params: LabelParams
+) -> NDArray[np.float64]:
+    """Return the mean heights of the levels of room extent; the largest one at least."""
+    order = np.argsort(heights)
+    heights, areas = heights[order], areas[order]
+    level = np.concatenate(([0], np.cumsum(np.diff(heights) > LEVEL_STEP)))
+    extents = np.bincount(level, areas)
+    means = np.bincount(level, areas * heights) / extents
+    enough = max(params.room_extent_m2, params.room_extent_share * extents.max())
+    return means[extents >= min(enough, extents.max())]
+
+
+def _walls_stand_on(scans: list[Segments], level: float) -> bool:
+    above = below = 0.0
+    for scan in scans:
+        walls = scan.of_kind("vertical")
+        middle = scan.heights[walls].mean(axis=1)
+        above += scan.areas[walls][middle > level].sum()
+        below += scan.areas[walls][middle <= level].sum()
+    return above >= below
+
+
+def role_of(height: float, levels: Levels, params: LabelParams) -> str | None:
+    """Return whether a horizontal segment at a height is floor or ceiling; None for neither."""
+    if levels.floor is not None and height < levels.floor + 3 * LEVEL_STEP:
+        return "floor" if height > levels.floor - 3 * LEVEL_STEP else None
+    if levels.ceiling is None or height > levels.ceiling + 3 * LEVEL_STEP:
+        return None
+    if levels.floor is None:  # no floor to stand on: what lies within a storey's mixed ceilings
+        return "ceiling" if height > levels.ceiling - MIXED else None
+    return "ceiling" if height >= levels.floor + params.headroom_m else None

@@ -1,0 +1,166 @@
+"""The command line: answers, exit codes and sentences."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flows.cli import main
+from storage.snapshots import none
+from tasks.scans.bundle import write_bundle
+from tasks.simulation.clouds import furnished_room
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def cloud():
+    return furnished_room(30_000, 1)[0]
+
+
+@pytest.fixture
+def mapsense(tmp_path, monkeypatch, capsys):
+    """Return what runs the command in an empty folder: its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as left:
+            main([str(argument) for argument in arguments])
+        said = capsys.readouterr()
+        return left.value.code, said.out, said.err
+
+    return run
+
+
+@pytest.fixture
+def served(prefect_server, monkeypatch):
+    monkeypatch.setenv("PREFECT_API_URL", prefect_server)
+
+
+@pytest.mark.parametrize("verb", ["map", "demo", "query", "status", "rerun"])
+def test_help_shows_an_example(mapsense, verb):
+    code, out, _ = mapsense(verb, "--help")
+    assert code == 0
+    assert f"mapsense {verb}" in out.partition("Usage:")[2].partition("\n")[2]
+
+
+def test_help_answers_at_once():
+    heavy = ["prefect", "open3d", "numpy", "pyarrow", "duckdb", "sklearn"]
+    code = f"import sys, flows.cli; print(*set({heavy}) & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == []
+
+
+def test_map_query_status_and_rerun(mapsense, served, cloud, tmp_path):
+    for name in ("a", "b"):
+        write_bundle(tmp_path / "scans" / f"{name}.scan", cloud, none())
+    broken = tmp_path / "scans" / "b.scan" / "points.parquet"
+    whole = broken.read_bytes()
+    broken.write_bytes(b"no Parquet")
+
+    asked = ("map", "scans", "--building", "hut", "--storey", "0", "--set", "hough.gamma_cell=25")
+    code, out, err = mapsense(*asked)
+    assert code == 1
+    assert "hut/0: 1 rooms" in out
+    assert "1 of 2 scans skipped: b: " in err
+
+    code, out, _ = mapsense("status", "--json")
+    (row,) = json.loads(out)
+    assert (code, row["building"], row["state"]) == (0, "hut", "partial")
+
+    code, out, _ = mapsense("query", "failures", "--format", "json")
+    assert {row["stage"] for row in json.loads(out)} == {"(run)", "clouds"}
+
+    broken.write_bytes(whole)
+    code, out, _ = mapsense("rerun", "--json")
+    (summary,) = json.loads(out)
+    assert code == 0
+    assert summary["state"] == "completed"
+    assert summary["used"]["params"]["hough"]["gamma_cell"] == 25
+    assert summary["stages"]["clouds"]["cached"] == 1
+
+    code, out, _ = mapsense("rerun")
+    assert (code, out) == (0, "nothing to run again: 1 completed storeys\n")
+
+
+def test_named_queries_are_listed_with_what_they_answer(mapsense):
+    code, out, _ = mapsense("query")
+    assert code == 0
+    for name in ("stage_times", "time_against_points", "failures", "cache_hits", "slowest"):
+        assert name in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("map", "x", "--building", "b", "--storey", "0", "--set", "hough.gama_cell=2"),
+         "unknown setting 'hough.gama_cell': did you mean 'hough.gamma_cell'"),
+        (("map", "x", "--building", "b", "--storey", "0", "--set", "hough.gamma_cell=-2"),
+         "setting 'hough.gamma_cell' = -2: input should be greater than 0"),
+        (("map", "x", "--building", "b", "--storey", "0", "--set", "gamma_cell"),
+         "--set gamma_cell: expected STAGE.NAME=VALUE"),
+        (("map", "x", "--building", "../b", "--storey", "0"), "'../b' is no usable name"),
+        (("map", "--building", "b", "--storey", "0"), "no scan named"),
+        (("map", "missing", "--building", "b", "--storey", "0"),
+         "b/0: none of 1 scans could be used: "),
+        (("status", "--store", "nowhere"), "nowhere: there is no store"),
+        (("nonsense",), "Unknown command"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_one_sentence(mapsense, served, arguments, sentence):
+    code, out, err = mapsense(*arguments)
+    assert code == 1
+    assert out == ""
+    assert sentence in err
+    assert err.startswith("mapsense: ")
+    assert err.count("\n") == 1
+
+
+def test_a_store_that_cannot_be_written_is_said_before_any_work(mapsense, tmp_path):
+    (tmp_path / "file").write_text("")
+    code, _, err = mapsense(
+        "map", "x", "--building", "b", "--storey", "0", "--store", tmp_path / "file" / "store"
+    )
+    assert code == 1
+    assert "the store cannot be written (Not a directory)" in err
+
+
+@pytest.mark.parametrize(
+    ("variable", "file", "sentence"),
+    [
+        ("MAPSENSE_STOR", "", "environment MAPSENSE_STOR: unknown setting 'stor': did you mean"),
+        (None, "stroe = 'x'", "mapsense.toml: unknown setting 'stroe': did you mean 'store'"),
+        (None, "store = ", "is no TOML"),
+        (None, "jobs = 0", "setting 'jobs' = 0: input should be greater than 0"),
+    ],
+)
+def test_unknown_settings_are_errors(mapsense, monkeypatch, tmp_path, variable, file, sentence):
+    if variable:
+        monkeypatch.setenv(variable, "x")
+    (tmp_path / "mapsense.toml").write_text(file)
+    code, _, err = mapsense("status")
+    assert code == 1
+    assert sentence in err
+
+
+def test_the_command_serves_prefect_by_itself(cloud, prefect_home, tmp_path):
+    write_bundle(tmp_path / "a.scan", cloud, none())
+    arguments = ["map", "a.scan", "--building", "hut", "--storey", "0", "--json"]
+    environment = {k: v for k, v in os.environ.items() if k != "PREFECT_API_URL"}
+    done = subprocess.run(
+        [sys.executable, "-c", "from flows.cli import main; main()", *arguments],
+        cwd=tmp_path,
+        env=environment | {"PREFECT_HOME": str(prefect_home), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["found"]["rooms"] == 1
+    assert done.stderr == ""
