@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,7 +18,7 @@ from storage.runs import Run, goes_on, last_runs, read_runs
 
 def ask(what: str | None, store: Path | None, form: str, out: Path | None) -> int:
     """Answer a query, or list the named ones."""
-    from storage.catalog import named_queries, open_catalog
+    from storage.catalog import Catalog, named_queries
 
     if what is None:
         print_table(
@@ -29,10 +30,10 @@ def ask(what: str | None, store: Path | None, form: str, out: Path | None) -> in
             )
         )
         return 0
-    catalog = open_catalog(_existing(store))
+    catalog = Catalog(_existing(store))
+    answer = catalog.query(what)
     for problem in catalog.problems:
         print(f"mapsense: {problem}", file=sys.stderr)
-    answer = catalog.query(what)
     if form == "parquet" and out is None:
         raise MapSenseError("--format parquet needs a file: add --out FILE")
     if out is None:
@@ -88,7 +89,8 @@ def state_now(store: str, run: Run) -> str:
 def write_answer(answer: pa.Table, form: str, file: IO[str]) -> None:
     """Write an answer as a table for people, JSON or CSV."""
     if form == "json":
-        json.dump(answer.to_pylist(), file, indent=1, default=_plain)
+        rows = [{name: _json(value) for name, value in row.items()} for row in answer.to_pylist()]
+        json.dump(rows, file, indent=1, default=_plain, allow_nan=False)
         file.write("\n")
     elif form == "csv":
         writer = csv.writer(file)
@@ -125,6 +127,10 @@ def _text(value: Any) -> str:
     if isinstance(value, datetime):
         return f"{value:%Y-%m-%d %H:%M:%S}"
     return str(_plain(value)) if isinstance(value, bytes) else str(value)
+
+
+def _json(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _plain(value: Any) -> str:

@@ -61,9 +61,11 @@ def map_(
 ) -> int:
     """Map the scans of one storey: its rooms and walls as a plan and drawings.
 
-    Example:
+    For example
 
-        mapsense map scans/level2 --building library --storey 2 --out library-2
+    ```
+    mapsense map scans/level2 --building library --storey 2 --out library-2
+    ```
     """
     if not scans:
         raise MapSenseError("no scan named: mapsense map SCAN... --building B --storey S")
@@ -89,9 +91,11 @@ def demo(
 ) -> int:
     """Simulate the scans of a small storey, map them, and compare the rooms with the truth.
 
-    Example:
+    For example
 
-        mapsense demo --out demo
+    ```
+    mapsense demo --out demo
+    ```
     """
     from flows.verbs import run_demo
 
@@ -113,11 +117,12 @@ def query(
 ) -> int:
     """Ask the store: a named query or SQL, read only; without either, list the named ones.
 
-    Example:
+    For example
 
-        mapsense query stage_times
-
-        mapsense query "select building, storey, count(*) from rooms group by all"
+    ```
+    mapsense query stage_times
+    mapsense query "select building, storey, count(*) from rooms group by all"
+    ```
     """
     from flows.answers import ask
 
@@ -136,9 +141,11 @@ def status(
 ) -> int:
     """Show the last run of each storey: how it ended, what failed and why.
 
-    Example:
+    For example
 
-        mapsense status --building library
+    ```
+    mapsense status --building library
+    ```
     """
     from flows.answers import show_status
 
@@ -160,9 +167,11 @@ def rerun(
 
     What was computed before comes from the cache: only what is missing is computed.
 
-    Example:
+    For example
 
-        mapsense rerun --building library
+    ```
+    mapsense rerun --building library
+    ```
     """
     from flows.verbs import run_again
 
@@ -179,6 +188,15 @@ def main(arguments: list[str] | None = None) -> None:
         if "--debug" in given:
             raise
         print(f"mapsense: {_sentence(error)}", file=sys.stderr)
+        sys.exit(1)
+    except Exception as error:
+        if "--debug" in given:
+            raise
+        kind = type(error).__name__
+        print(
+            f"mapsense: unexpected {kind}: {_sentence(error)}; --debug shows where it came from",
+            file=sys.stderr,
+        )
         sys.exit(1)
     except KeyboardInterrupt:
         print("mapsense: interrupted; run again, what was computed is kept", file=sys.stderr)

@@ -30,14 +30,16 @@ class RoomMatch:
         return asdict(self)
 
 
-def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> Plan:
-    """Simulate a furnished storey and its scans into a folder; return the truth."""
+def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> tuple[Plan, tuple[Path, ...]]:
+    """Simulate a furnished storey and its scans into a folder; return the truth and the scans."""
     truth = make_storey(StoreyParams(seed=seed), BUILDING, STOREY)
     write_plan(truth, folder / "truth.geojson")
+    scans = []
     for name, cloud, snapshots in simulate_scans(truth, CampaignParams(seed=seed)):
-        write_bundle(folder / "scans" / f"{name}.scan", cloud, snapshots)
+        scans.append(folder / "scans" / f"{name}.scan")
+        write_bundle(scans[-1], cloud, snapshots)
         told(f"simulated scan {name}: {len(cloud):,} points")
-    return truth
+    return truth, tuple(scans)
 
 
 def compare_rooms(truth: Plan, mapped: Plan) -> list[RoomMatch]:

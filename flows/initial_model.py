@@ -54,7 +54,8 @@ def _wall(walls: Walls, i: int) -> PlanWall:
         thickness_m=_known(walls.thickness_m[i]),
         base_m=_known(walls.base_m[i]),
         top_m=_known(walls.top_m[i]),
-        rooms=tuple(f"r{room}" for room in walls.rooms[i] if room >= 0),
+        # a wall that juts into a room has it on both sides
+        rooms=tuple(dict.fromkeys(f"r{room}" for room in walls.rooms[i] if room >= 0)),
     )
 
 

@@ -63,12 +63,13 @@ def run_demo(out: Path, store: Path | None, seed: int, jobs: int | None, as_json
         from flows.work import is_done, run_storey
         from storage.plan_geojson import read_plan
 
-        truth = demo.simulate(out, seed, lambda line: _tell(line, not as_json))
+        truth, scans = demo.simulate(out, seed, lambda line: _tell(line, not as_json))
         request = StoreyRequest(
             store=str(root),
             building=demo.BUILDING,
             storey=demo.STOREY,
-            scans=(str(out / "scans"),),
+            # by name: scans of another seed may lie beside them
+            scans=tuple(str(scan) for scan in scans),
             params=parse_params(settings.params),
             out=str(out),
             simulated=True,
@@ -134,7 +135,11 @@ def _run_again(root: Path, runs: list[Run], settings: Settings, as_json: bool) -
 def _tally(root: Path, last: list[Run]) -> str:
     states = [state_now(str(root), run) for run in last]
     counts = [f"{states.count(state)} {state}" for state in sorted(set(states))]
-    return ", ".join(counts) + " storeys" if counts else "no storey was mapped"
+    return "last runs: " + ", ".join(counts) if counts else "no storey was mapped"
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def _print_summary(summary: dict[str, Any], as_json: bool) -> None:
@@ -150,8 +155,9 @@ def _print_summary(summary: dict[str, Any], as_json: bool) -> None:
     total = cached + sum(cost["computed"] + cost["failed"] for cost in costs)
     simulated = ", simulated" if summary["simulated"] else ""
     print(
-        f"{name}: {found['rooms']} rooms, {found['area_m2']} m², {found['walls']} walls from "
-        f"{len(used['scans'])} scans ({used['points']:,} points{simulated}) in "
+        f"{name}: {_count(found['rooms'], 'room')}, {found['area_m2']} m², "
+        f"{_count(found['walls'], 'wall')} from {_count(len(used['scans']), 'scan')} "
+        f"({used['points']:,} points{simulated}) in "
         f"{summary['seconds']:.1f} s, {cached} of {total} stages from the cache"
     )
     print(f"plan: {summary['out']}/plan.geojson, plan.svg, plan.png")

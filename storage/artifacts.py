@@ -4,11 +4,11 @@ An artifact is one immutable Parquet file, named by the hash of its content. A s
 `Ref` on, never the arrays.
 """
 
-import contextlib
 import os
 import re
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -124,28 +124,23 @@ def column(name: str, type_: pa.DataType, about: str, *, nullable: bool = False)
 
 def write(kind: Kind[T], value: T, place: Place) -> Ref:
     """Write `value` into the store as one Parquet file named by the hash of its content."""
-    table = kind.to_table(value)
-    folder = place.folder(kind.table)
-    digest = ""
-
-    def target(temporary: Path) -> Path:
-        nonlocal digest
+    table, folder = kind.to_table(value), place.folder(kind.table)
+    with _written(table, Path(place.store) / folder, kind.write_options or {}) as temporary:
         digest = _hash(temporary)
-        return Path(place.store) / folder / f"{digest[:24]}.parquet"
-
-    path = _put(table, Path(place.store) / folder, target, kind.write_options or {})
-    return Ref(uri=f"{folder}/{path.name}", sha256=digest, rows=table.num_rows, table=kind.table)
+        uri = f"{folder}/{digest[:24]}.parquet"
+        os.replace(temporary, Path(place.store) / uri)
+    return Ref(uri=uri, sha256=digest, rows=table.num_rows, table=kind.table)
 
 
 def replace_table(path: Path, table: pa.Table) -> None:
     """Write a table to `path`, in place of what is there: a reader sees the old or the new."""
-    _put(table, path.parent, lambda _: path, {})
+    with _written(table, path.parent, {}) as temporary:
+        os.replace(temporary, path)
 
 
-def _put(
-    table: pa.Table, folder: Path, target: Callable[[Path], Path], options: dict[str, Any]
-) -> Path:
-    """Write beside the target, sync, rename: a reader sees all of it or nothing."""
+@contextmanager
+def _written(table: pa.Table, folder: Path, options: dict[str, Any]) -> Iterator[Path]:
+    """Write beside the target and sync; renamed within, a reader sees all of it or nothing."""
     # a dot file: no *.parquet glob sees it before the rename
     temporary = folder / f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp"
     try:
@@ -154,16 +149,14 @@ def _put(
             pq.write_table(table, file, **({"compression": "zstd"} | options))
             file.flush()
             os.fsync(file.fileno())
-        path = target(temporary)
-        os.replace(temporary, path)
+        yield temporary
     except OSError as error:
-        with contextlib.suppress(OSError):  # what stopped the writing may stop this too
+        with suppress(OSError):  # what stopped the writing may stop this too
             temporary.unlink()
         raise StoreError(
             f"{folder}: cannot write there ({error.strerror or error}); make the store "
             "writable, free space on its disk, or choose another with --store"
         ) from error
-    return path
 
 
 def read(kind: Kind[T], ref: Ref, store: Path | str) -> T:

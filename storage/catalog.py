@@ -7,9 +7,11 @@ every artifact there is. `runs` and `stages` are histories and show everything.
 """
 
 import importlib
+import logging
 import pkgutil
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,16 @@ PARTITIONS = ("building", "storey", "scan")
 HISTORIES = {"runs": runs.SCHEMA, "stages": stages.SCHEMA}
 
 
+CURRENT = """
+with last as (
+  select id from runs where list_contains($mapped, state)
+  qualify row_number() over (partition by building, storey order by started_at desc, id desc) = 1
+)
+select distinct unnest(outputs) from stages join last on stages.run = last.id
+"""
+log = logging.getLogger(__name__)
+
+
 class QueryError(MapSenseError):
     """A query that cannot be answered, and why."""
 
@@ -41,27 +53,79 @@ class NamedQuery:
     sql: str
 
 
-@dataclass
 class Catalog:
-    """The views of one store."""
+    """The views of one store, each made when a query first names it.
 
-    connection: duckdb.DuckDBPyConnection
-    problems: list[str] = field(default_factory=list)
-    """files that were left out, and why"""
+    Arrow reads the files, DuckDB only sees the tables: its access to files is switched off for
+    good, so no SQL can write, change or remove anything in the store, or read beside it.
+    """
+
+    def __init__(self, store: Path | str) -> None:
+        self.store = Path(store)
+        self.problems: list[str] = []
+        """files that were left out, and why"""
+        self._connection = duckdb.connect(":memory:")
+        for setting in ("TimeZone = 'UTC'", "enable_external_access = false"):
+            self._connection.execute(f"set {setting}")
+        self._connection.execute("set lock_configuration = true")
+        for table, schema in HISTORIES.items():
+            self._connection.register(table, self._dataset(table, schema, None).to_table())
+        self._kinds = {kind.table: kind for kind in _all_kinds()}
+        self._views = {*self._kinds, *(f"{table}_all" for table in self._kinds)}
 
     def query(self, name_or_sql: str, params: Mapping[str, Any] | None = None) -> pa.Table:
         """Return the answer to a named query or to SQL; `$name` in it stands for a parameter."""
-        named = {query.name: query.sql for query in named_queries()}
-        sql = named.get(name_or_sql.strip(), name_or_sql)
-        if " " not in sql.strip() and "\n" not in sql.strip():
-            raise QueryError(
-                f"'{sql}' is no named query; there are {', '.join(sorted(named))}, or write SQL"
-            )
+        sql = _sql(name_or_sql)
+        self._make_views(sql)
         try:
-            answer = self.connection.sql(sql, params=dict(params) if params else None)
+            answer = self._connection.sql(sql, params=dict(params) if params else None)
             return pa.table({}) if answer is None else answer.to_arrow_table()
         except duckdb.Error as error:
             raise QueryError(f"the query failed: {_sentence(error)}") from error
+
+    def _make_views(self, sql: str) -> None:
+        """Make the views a query may need: looking at every file of a store takes its time."""
+        words = set(re.findall(r"\w+", sql.lower()))
+        asks_for_tables = words & {"show", "information_schema", "duckdb_views", "duckdb_columns"}
+        for name in sorted(self._views if asks_for_tables else self._views & words):
+            kind = self._kinds.get(name) or self._kinds[name.removesuffix("_all")]
+            only = self._current() if name == kind.table else None
+            self._connection.register(name, self._dataset(kind.table, kind.schema, only))
+            self._views.discard(name)
+
+    def _current(self) -> set[str]:
+        """Return the artifacts of each storey's last successful run."""
+        rows = self._connection.sql(CURRENT, params={"mapped": list(runs.MAPPED)}).fetchall()
+        return {uri for (uri,) in rows}
+
+    def _dataset(self, table: str, schema: pa.Schema, only: set[str] | None) -> ds.Dataset:
+        """Return one table's files as one table, its place in the building as columns."""
+        found = self.store.glob(f"{table}/**/*.parquet")
+        paths = sorted(path.relative_to(self.store).as_posix() for path in found)
+        sound = [
+            str(self.store / path)
+            for path in paths
+            if (only is None or path in only) and self._is_sound(self.store / path, table, schema)
+        ]
+        partitions = [
+            pa.field(name, pa.string()) for name in PARTITIONS if name not in schema.names
+        ]
+        whole = pa.schema([*partitions, *schema])
+        if not sound:
+            return ds.dataset(whole.empty_table())
+        return ds.dataset(
+            sound,
+            schema=whole,
+            format="parquet",
+            partitioning=ds.partitioning(pa.schema(partitions), flavor="hive"),
+            partition_base_dir=str(self.store / table),
+        )
+
+    def _is_sound(self, path: Path, table: str, schema: pa.Schema) -> bool:
+        problem = _problem(path, table, schema)
+        if problem is not None and (told := f"{path}: {problem}; left out") not in self.problems:
+            self.problems.append(told)
+        return problem is None
 
 
 def named_queries() -> list[NamedQuery]:
@@ -78,31 +142,25 @@ def named_queries() -> list[NamedQuery]:
 def run_query(
     store: Path | str, name_or_sql: str, params: Mapping[str, Any] | None = None
 ) -> pa.Table:
-    """Return the answer to a named query or to SQL over a store; see `open_catalog` for more."""
-    return open_catalog(store).query(name_or_sql, params)
+    """Return the answer to a named query or to SQL over a store.
 
-
-def open_catalog(store: Path | str) -> Catalog:
-    """Return the views over a store as it is now; a file that is no table of ours is left out.
-
-    Arrow reads the files, DuckDB only sees the tables: its access to files is switched off for
-    good, so no SQL can write, change or remove anything in the store, or read beside it.
+    Files that are no tables of ours are left out and named in the log; `Catalog` lists them.
     """
-    root = Path(store)
-    catalog = Catalog(duckdb.connect(":memory:"))
-    catalog.connection.execute("set TimeZone = 'UTC'")
-    catalog.connection.execute("set enable_external_access = false")
-    for table, schema in HISTORIES.items():
-        catalog.connection.register(table, _dataset(root, table, schema, None, catalog).to_table())
-    current = _current(catalog.connection)
-    for kind in _all_kinds():
-        for name, only in ((kind.table, current), (f"{kind.table}_all", None)):
-            catalog.connection.register(
-                name, _dataset(root, kind.table, kind.schema, only, catalog)
-            )
-    catalog.connection.execute("set lock_configuration = true")
-    catalog.problems = sorted(set(catalog.problems))
-    return catalog
+    catalog = Catalog(store)
+    answer = catalog.query(name_or_sql, params)
+    for problem in catalog.problems:
+        log.warning(problem)
+    return answer
+
+
+def _sql(name_or_sql: str) -> str:
+    named = {query.name: query.sql for query in named_queries()}
+    text = name_or_sql.strip()
+    if text not in named and len(text.split()) < 2:
+        raise QueryError(
+            f"'{text}' is no named query; there are {', '.join(sorted(named))}, or write SQL"
+        )
+    return named.get(text, text)
 
 
 def _all_kinds() -> list[Kind[Any]]:
@@ -111,47 +169,6 @@ def _all_kinds() -> list[Kind[Any]]:
         if module.name != "catalog":
             importlib.import_module(f"storage.{module.name}")
     return [kind for kind in kinds() if kind.type.__module__.startswith("storage.")]
-
-
-def _current(connection: duckdb.DuckDBPyConnection) -> set[str]:
-    """Return the artifacts of each storey's last successful run."""
-    mapped = ", ".join(f"'{state}'" for state in runs.MAPPED)
-    rows = connection.sql(
-        f"""
-        with last as (
-          select id from runs where state in ({mapped})
-          qualify row_number() over (partition by building, storey order by started_at desc, id) = 1
-        )
-        select distinct unnest(outputs) from stages join last on stages.run = last.id
-        """
-    ).fetchall()
-    return {uri for (uri,) in rows}
-
-
-def _dataset(
-    root: Path, table: str, schema: pa.Schema, only: set[str] | None, catalog: Catalog
-) -> ds.Dataset:
-    """Return one table's files as one table, its place in the building as columns."""
-    sound = []
-    paths = sorted(path.relative_to(root).as_posix() for path in root.glob(f"{table}/**/*.parquet"))
-    for path in paths:
-        if only is None or path in only:
-            problem = _problem(root / path, table, schema)
-            if problem is None:
-                sound.append(path)
-            else:
-                catalog.problems.append(f"{root / path}: {problem}; left out")
-    partitions = [pa.field(name, pa.string()) for name in PARTITIONS if name not in schema.names]
-    whole = pa.schema([*partitions, *schema])
-    if not sound:
-        return ds.dataset(whole.empty_table())
-    return ds.dataset(
-        [str(root / path) for path in sound],
-        schema=whole,
-        format="parquet",
-        partitioning=ds.partitioning(pa.schema(partitions), flavor="hive"),
-        partition_base_dir=str(root / table),
-    )
 
 
 def _problem(path: Path, table: str, schema: pa.Schema) -> str | None:

@@ -54,7 +54,11 @@ class FlockLockManager(LockManager):
             return True
         if not _poll(lambda: self._take(key, holder), acquire_timeout):
             return False
-        self._on_locked(key)
+        try:
+            self._on_locked(key)
+        except BaseException:
+            self.release_lock(key, holder)
+            raise
         return True
 
     def release_lock(self, key: str, holder: str) -> None:

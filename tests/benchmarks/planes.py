@@ -81,6 +81,7 @@ def _rows(found: dict[str, Measured]) -> list[dict[str, Any]]:
 
 def _targets(n: int, found: dict[str, Measured], seeds: Measured) -> list[Target]:
     ours, points = found[OURS].figures, f"{n:,} points"
+    worst = seeds.figures["angle_worst_deg"], seeds.figures["offset_worst_mm"]
     bound = {500_000: 0.05, 2_000_000: 0.01}.get(n)
     ratio = found[OURS].ratio(found.get(SEGMENT))
     time = [] if bound is None else [Target(f"{points}: time / segment_plane", ratio, bound, "x")]
@@ -88,11 +89,19 @@ def _targets(n: int, found: dict[str, Measured], seeds: Measured) -> list[Target
         *time,
         Target(f"{points}: median angle error", ours.get("angle_deg"), 0.02, " deg"),
         Target(f"{points}: median offset error", ours.get("offset_mm"), 0.5, " mm"),
+        Target(f"{points}: worst angle error in {SEEDS} rooms", worst[0], 0.1, " deg"),
+        Target(f"{points}: worst offset error in {SEEDS} rooms", worst[1], 2, " mm"),
         Target(f"{points}: peak above the cloud", found[OURS].above_mb, 30, " MB"),
         Target(
             f"{points}: rooms with 6 of 6 surfaces, of {SEEDS}",
             seeds.figures["complete"],
             SEEDS,
+            at_least=True,
+        ),
+        Target(
+            f"{points}: furniture found of 12, median of {SEEDS} rooms",
+            seeds.figures["furniture_median"],
+            7,
             at_least=True,
         ),
     ]

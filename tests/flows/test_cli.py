@@ -6,9 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flows.cli import main
+from storage.points import PointCloud
 from storage.snapshots import none
 from tasks.scans.bundle import write_bundle
 from tasks.simulation.clouds import furnished_room
@@ -18,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="module")
 def cloud():
-    return furnished_room(30_000, 1)[0]
+    return PointCloud(furnished_room(30_000, 1)[0], np.zeros(3))
 
 
 @pytest.fixture
@@ -67,7 +69,7 @@ def test_map_query_status_and_rerun(mapsense, served, cloud, tmp_path):
     asked = ("map", "scans", "--building", "hut", "--storey", "0", "--set", "hough.gamma_cell=25")
     code, out, err = mapsense(*asked)
     assert code == 1
-    assert "hut/0: 1 rooms" in out
+    assert "hut/0: 1 room, " in out
     assert "1 of 2 scans skipped: b: " in err
 
     code, out, _ = mapsense("status", "--json")
@@ -86,7 +88,7 @@ def test_map_query_status_and_rerun(mapsense, served, cloud, tmp_path):
     assert summary["stages"]["clouds"]["cached"] == 1
 
     code, out, _ = mapsense("rerun")
-    assert (code, out) == (0, "nothing to run again: 1 completed storeys\n")
+    assert (code, out) == (0, "nothing to run again: last runs: 1 completed\n")
 
 
 def test_named_queries_are_listed_with_what_they_answer(mapsense):

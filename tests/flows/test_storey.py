@@ -3,12 +3,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flows.params import MapSenseParams
 from flows.request import StoreyRequest
 from storage.catalog import run_query
 from storage.plan_geojson import read_plan
+from storage.points import PointCloud
 from storage.runs import read_runs
 from storage.snapshots import none
 from tasks.scans.bundle import write_bundle
@@ -17,7 +19,7 @@ from tasks.simulation.clouds import furnished_room
 
 @pytest.fixture(scope="module")
 def clouds():
-    return [furnished_room(30_000, seed)[0] for seed in (1, 2)]
+    return [PointCloud(furnished_room(30_000, seed)[0], np.zeros(3)) for seed in (1, 2)]
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """Labelling of hand-made surfaces: what is floor, ceiling and wall, and what is one wall."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def room(x0, y0, x1, y1, *, floor=True, ceiling=True):
     """Return the rectangles of an empty room."""
     ring = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
     low, high = level(x0, y0, x1, y1, 0.0), level(x0, y0, x1, y1, HEIGHT)
-    return [low] * floor + [high] * ceiling + [wall(*ends) for ends in zip(ring, ring[1:])]  # noqa: B905
+    return [low] * floor + [high] * ceiling + [wall(*ends) for ends in pairwise(ring)]
 
 
 def scanned(rectangles, seen_from=None):
@@ -125,7 +127,7 @@ def test_a_lamp_above_and_a_hole_below_together_do_not_win():
 
 
 def test_a_lowered_ceiling_over_a_part_of_the_room_stays_ceiling():
-    rectangles = [r for r in room(0, 0, 5, 4, ceiling=False)]
+    rectangles = room(0, 0, 5, 4, ceiling=False)
     rectangles += [level(0, 0, 5, 2.5, HEIGHT), level(0, 2.5, 5, 4, 2.4)]
     _, coverage = labelled(rectangles)
     assert coverage.ceiling_level_m == pytest.approx(HEIGHT)
@@ -157,26 +159,25 @@ def test_a_cloud_with_neither_has_no_levels_and_no_coverage():
     assert len(faces) == 1
 
 
-@pytest.mark.parametrize("scans", [[], [[]]], ids=["no scan", "a scan without planes"])
-def test_nothing_gives_nothing(scans):
-    segments = [scanned(room(0, 0, 5, 4)).__class__(**empty_segments()) for _ in scans]
-    faces, coverage = label_surfaces(segments, LabelParams())
-    assert len(faces) == 0 and len(coverage) == 0
-    rooms, walls, corners = intersect_walls(faces, coverage, IntersectParams())
-    assert (len(rooms), len(walls), len(corners)) == (0, 0, 0)
-
-
-def empty_segments():
-    segments = extract_segments(
+def without_planes():
+    """Return the segments of a cloud without points."""
+    no = np.empty(0)
+    return extract_segments(
         PointCloud(np.empty((0, 3), np.float32), np.zeros(3)),
         none(),
-        Planes(
-            np.empty((0, 3)), np.empty(0), np.empty(0, np.int64), np.empty(0), np.zeros(3)
-        ),
+        Planes(np.empty((0, 3)), no, np.empty(0, np.int64), no, np.zeros(3)),
         PlaneLabels(np.empty(0, np.int32)),
         FilterParams(),
     )
-    return vars(segments)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_no_scan_and_scans_without_planes_give_nothing(count):
+    faces, coverage = label_surfaces([without_planes()] * count, LabelParams())
+    assert len(faces) == 0 and len(coverage) == 0
+    assert coverage.floor_level_m is None and coverage.ceiling_level_m is None
+    rooms, walls, corners = intersect_walls(faces, coverage, IntersectParams())
+    assert (len(rooms), len(walls), len(corners)) == (0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -242,7 +243,7 @@ def test_eps_norm_is_the_cross_product_up_to_which_segments_are_one(eps_norm, co
 
 
 def test_two_scans_of_one_wall_are_one_face_seen_twice():
-    again = [(np.array(c) + [0.02, 0.02, 0.0], u, v) for c, u, v in room(0, 0, 5, 4)]
+    again = room(0.02, 0.02, 5.02, 4.02)
     faces, coverage = labelled(room(0, 0, 5, 4), again)
     assert len(faces) == 4
     assert (faces.scans == 2).all()
