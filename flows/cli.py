@@ -13,8 +13,16 @@ from cyclopts import App, CycloptsError, Parameter
 from flows.server import quiet
 from storage.errors import MapSenseError
 
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("mapsense")
+
+
 app = App(
     name="mapsense",
+    version=_version,
     help="Crowd-sourced indoor 3D scans in, accurate indoor models out.",
     help_format="markdown",
     version_flags=["--version"],
@@ -48,11 +56,15 @@ def map_(
     ] = None,
     set_: Set = None,
     up: Annotated[
-        str | None, Parameter(help="The files' up: x, -x, y, -y, z, -z or a,b,c.")
+        str | None,
+        Parameter(allow_leading_hyphen=True, help="The files' up: x, -x, y, -y, z, -z or a,b,c."),
     ] = None,
     scale: Annotated[float | None, Parameter(help="Metres per unit of the files.")] = None,
     crop: Annotated[
-        str | None, Parameter(help="Box to keep: xmin,ymin,zmin,xmax,ymax,zmax, metres.")
+        str | None,
+        Parameter(
+            allow_leading_hyphen=True, help="Box to keep: xmin,ymin,zmin,xmax,ymax,zmax, metres."
+        ),
     ] = None,
     jobs: Jobs = None,
     json: Json = False,
@@ -69,7 +81,10 @@ def map_(
     """
     if not scans:
         raise MapSenseError("no scan named: mapsense map SCAN... --building B --storey S")
-    own: dict[str, Any] = {"up": up, "scale": scale, "crop": crop.split(",") if crop else None}
+    box = crop.split(",") if crop else None
+    if box is not None and len(box) != 6:
+        raise MapSenseError(f"--crop {crop}: expected xmin,ymin,zmin,xmax,ymax,zmax, metres")
+    own: dict[str, Any] = {"up": up, "scale": scale, "crop": box}
     given = {"scans": {name: value for name, value in own.items() if value is not None}}
     from flows.verbs import map_scans
 

@@ -72,7 +72,7 @@ def summarise(
     return {
         "building": request.building,
         "storey": request.storey,
-        "state": state_of(mapped, skipped),
+        "state": _state(mapped, skipped),
         "message": message,
         "simulated": request.simulated,
         "run": request.run,
@@ -90,7 +90,7 @@ def summarise(
     }
 
 
-def state_of(mapped: Mapped | None, skipped: list[Skipped]) -> str:
+def _state(mapped: Mapped | None, skipped: list[Skipped]) -> str:
     """Return how a run ended."""
     if mapped is None:
         return FAILED

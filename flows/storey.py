@@ -1,6 +1,7 @@
 """Map one storey: from its scans to its plan, top to bottom as in Fig. 2."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from flows.request import StoreyRequest
 from flows.results import (
     Mapped,
     Skipped,
-    state_of,
     summarise,
     write_results,
     write_summary,
@@ -24,14 +24,14 @@ from flows.results import (
 from flows.settings import default_jobs
 from storage.artifacts import Ref, read
 from storage.coverage import COVERAGE
+from storage.errors import StoreError
 from storage.rooms import ROOMS
 from storage.runs import FAILED, Run, recorded
 from storage.scans import SCANS
 from storage.sources import Source
-from storage.stages import forget
+from storage.stages import forget, reason
 from storage.walls import WALLS
 from tasks.scans.sources import find_sources
-from tasks.stage.ledger import first_line
 
 
 def threads(jobs: int | None = None) -> Any:
@@ -56,17 +56,29 @@ def map_storey(request: StoreyRequest) -> Any:
         started_at=started_at,
     )
     with recorded(request.store, run) as record:
-        sources, errors = find_sources([Path(path) for path in request.scans])
-        skipped = [Skipped(error.path, first_line(error)) for error in errors]
-        mapped = _map(request, sources, skipped) if sources else None
-        message = _message(len(sources) + len(errors), skipped, mapped)
-        if mapped is not None:
-            write_results(request, mapped)
-        summary = summarise(request, mapped, skipped, message, started_at)
-        write_summary(request, summary)
-        record.end(state_of(mapped, skipped), message)
+        try:
+            summary = _run(request, started_at)
+        except Exception as error:
+            # no summary of an earlier run may speak for this one
+            with suppress(StoreError):
+                write_summary(request, summarise(request, None, [], reason(error), started_at))
+            raise
+        record.end(summary["state"], summary["message"])
     forget(request.place())
-    return Failed(message=message) if summary["state"] == FAILED else summary
+    return Failed(message=summary["message"]) if summary["state"] == FAILED else summary
+
+
+def _run(request: StoreyRequest, started_at: datetime) -> dict[str, Any]:
+    """Map the storey, write what was found, and return its summary."""
+    sources, errors = find_sources([Path(path) for path in request.scans])
+    skipped = [Skipped(error.path, reason(error)) for error in errors]
+    mapped = _map(request, sources, skipped) if sources else None
+    if mapped is not None:
+        write_results(request, mapped)
+    message = _message(len(sources) + len(errors), skipped, mapped)
+    summary = summarise(request, mapped, skipped, message, started_at)
+    write_summary(request, summary)
+    return summary
 
 
 def _map(request: StoreyRequest, sources: list[Source], skipped: list[Skipped]) -> Mapped | None:
@@ -102,8 +114,8 @@ def _is_used(name: str, futures: Iterable[PrefectFuture[Any]], skipped: list[Ski
         future.wait()
         if not future.state.is_completed():
             error = future.state.result(raise_on_failure=False)
-            reason = first_line(error) if isinstance(error, BaseException) else future.state.message
-            skipped.append(Skipped(name, reason or future.state.name or "unknown"))
+            why = reason(error) if isinstance(error, BaseException) else future.state.message
+            skipped.append(Skipped(name, why or future.state.name or "unknown"))
             return False
     return True
 

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 
 from storage.artifacts import Place, column, replace_table, schema
 from storage.errors import StoreError
+from storage.stages import reason
 
 RUNNING, COMPLETED, PARTIAL, FAILED = "running", "completed", "partial", "failed"
 MAPPED = (COMPLETED, PARTIAL)
@@ -84,7 +85,7 @@ def recorded(store: str, run: Run) -> Iterator[Recorder]:
         _write(store, run)
         yield recorder
     except BaseException as error:
-        recorder.end(FAILED, _first_line(error))
+        recorder.end(FAILED, reason(error))
         raise
     finally:
         ended = replace(recorder.run, ended_at=datetime.now(UTC))
@@ -122,7 +123,7 @@ def read_runs(
             rows = pq.read_table(path, columns=SCHEMA.names, partitioning=None).to_pylist()
         except (OSError, pa.ArrowException) as error:
             raise StoreError(
-                f"{path}: is no record of a run ({_first_line(error)}); remove the file"
+                f"{path}: is no record of a run ({reason(error)}); remove the file"
             ) from error
         runs += [Run(building=names["building"], storey=names["storey"], **row) for row in rows]
     return sorted(runs, key=lambda run: (run.started_at, run.id))
@@ -156,7 +157,3 @@ def _hold(path: Path) -> int:
         ) from error
     fcntl.flock(descriptor, fcntl.LOCK_EX)
     return descriptor
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).splitlines() or [""])[0] or type(error).__name__

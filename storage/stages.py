@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from storage.artifacts import Place, column, replace_table, schema
+from storage.errors import MapSenseError
 
 OUTCOMES = ("computed", "cached", "failed")
 
@@ -97,6 +98,14 @@ def forget(place: Place) -> None:
     folder = place.model_copy(update={"scan": None}).folder("stages")
     with _mutex:
         _written.pop((place.store, folder, place.run), None)
+
+
+def reason(error: BaseException) -> str:
+    """Return why something failed, in one line: what is not meant for people, with its type."""
+    line = (str(error).splitlines() or [""])[0]
+    if isinstance(error, MapSenseError):
+        return line
+    return f"{type(error).__name__}: {line}" if line else type(error).__name__
 
 
 def to_table(rows: list[StageRow]) -> pa.Table:

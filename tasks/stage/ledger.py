@@ -70,18 +70,13 @@ def computed(task_run: str, asked: Asked, cost: Cost, outputs: Sequence[Ref]) ->
 
 def failed(task_run: str, asked: Asked, cost: Cost, error: BaseException) -> None:
     """Write the row of a stage that failed."""
-    _write(asked, _row(task_run, asked, "failed", cost, (), first_line(error)))
+    _write(asked, _row(task_run, asked, "failed", cost, (), stages.reason(error)))
 
 
 def cached(task_run: str, asked: Asked, outputs: Sequence[Ref]) -> None:
     """Write the row of a stage whose result was there; its time is that of the look-up."""
     cost = Cost(wall_s=time.perf_counter() - asked.clock)
     _write(asked, _row(task_run, asked, "cached", cost, outputs))
-
-
-def first_line(error: BaseException) -> str:
-    """Return the first line of an error's text, or its type if it has none."""
-    return (str(error).splitlines() or [""])[0] or type(error).__name__
 
 
 def _row(

@@ -13,7 +13,7 @@ from tasks.surfaces import patches
 
 MIN_POINTS = 20
 """Points below which a patch is an accident."""
-REFIT_POINTS = 500_000
+REFIT_POINTS = 100_000
 """Points that settle the planes well enough before all points are labelled."""
 
 

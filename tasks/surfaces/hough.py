@@ -51,7 +51,7 @@ class HoughParams(Params):
     """Share of a tile's points at which the search ends. Not in the paper."""
     tries: PositiveInt = 100_000
     """Draws without a plane after which the wide pass ends. Not in the paper."""
-    tries_near: PositiveInt = 300_000
+    tries_near: PositiveInt = 150_000
     """Draws without a plane after which the narrow pass ends. Not in the paper."""
     misses: PositiveInt = 6
     """Full cells in a row that turn out to be no plane, after which a pass ends. Not in the

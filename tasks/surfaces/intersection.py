@@ -63,7 +63,7 @@ class IntersectParams(Params):
     """Share of their common border from which two cells are one room."""
     min_area_m2: PositiveFloat = 1.0
     """Smallest room, square metres."""
-    min_seen: float = Field(default=0.1, ge=0, le=1)
+    min_seen: float = Field(default=0.15, ge=0, le=1)
     """Least share of a room's area that was seen; a fifth of it for one walled on most sides."""
 
 

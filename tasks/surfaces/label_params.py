@@ -15,7 +15,7 @@ class LabelParams(Params):
     room_extent_m2: PositiveFloat = 1.0
     """Area below which a level is a lamp, a hole or a piece of furniture, square metres. Not in
     the paper."""
-    room_extent_share: PositiveFloat = 0.1
+    room_extent_share: PositiveFloat = 0.2
     """The same as a share of the largest level's area. Not in the paper."""
     headroom_m: PositiveFloat = 1.9
     """Least height of a ceiling above the floor, metres. Not in the paper."""

@@ -57,14 +57,24 @@ def _horizontals(scans: list[Segments]) -> tuple[NDArray[np.float64], NDArray[np
 def _large_levels(
     heights: NDArray[np.float64], areas: NDArray[np.float64], params: LabelParams
 ) -> NDArray[np.float64]:
-    """Return the mean heights of the levels of room extent; the largest one at least."""
-    order = np.argsort(heights)
-    heights, areas = heights[order], areas[order]
-    level = np.concatenate(([0], np.cumsum(np.diff(heights) > LEVEL_STEP)))
-    extents = np.bincount(level, areas)
-    means = np.bincount(level, areas * heights) / extents
-    enough = max(params.room_extent_m2, params.room_extent_share * extents.max())
-    return means[extents >= min(enough, extents.max())]
+    """Return the mean heights of the levels of room extent; the largest one at least.
+
+    Levels are taken largest first, each with what lies within a step of it: chains of tops and
+    shelves would lead from the floor to the ceiling.
+    """
+    left, levels, extents = areas.astype(float).copy(), [], []
+    while left.max() > 0:
+        near = np.abs(heights[:, None] - heights) <= LEVEL_STEP
+        best = int((near @ left).argmax())
+        members = near[best]
+        extents.append(left[members].sum())
+        levels.append(float(np.average(heights[members], weights=left[members])))
+        left[members] = 0
+        if extents[-1] < params.room_extent_m2:
+            break
+    enough = max(params.room_extent_m2, params.room_extent_share * extents[0])
+    large = np.array(extents) >= min(enough, extents[0])
+    return np.array(levels)[large]
 
 
 def _walls_stand_on(scans: list[Segments], level: float) -> bool:

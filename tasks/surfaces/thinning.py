@@ -20,6 +20,10 @@ MAX_CELLS = 1 << 26
 """Voxels of a scan's bounding box that one byte each may be kept for (64 MB)."""
 FULL = 255
 """Points of a voxel that are counted."""
+DENSE = 2
+"""Points per occupied voxel from which surfaces fill their voxels, and a voxel alone is clutter."""
+COMPANY = 3
+"""Occupied neighbours, of 26, a voxel of a surface has at least."""
 TAIL = 4
 """A voxel with fewer than a fourth of a neighbour's points holds the tail of its noise."""
 NEIGHBOURS = 8
@@ -66,7 +70,9 @@ def thin(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
     """Return the indices of one point per occupied voxel, the first in file order.
 
     Voxels with far fewer points than a neighbour are left out: in a dense cloud they hold the
-    tails of the noise, and counting them like the surface itself would make every wall thick.
+    tails of the noise, and counting them like the surface itself would make every wall thick. In
+    a dense cloud a voxel without neighbours is left out as well: clutter keeps its voxels however
+    many points there are, while a surface's are filled.
 
     Parameters
     ----------
@@ -113,6 +119,17 @@ def _voxel_of(xyz, i, low, inverse, shape):
     return x, y, z
 
 
+@nb.njit(inline="always")
+def _company(counts, x, y, z):
+    """Return how many of the 26 voxels around one are occupied."""
+    company = -1
+    for dx in range(-1, 2):
+        for dy in range(-1, 2):
+            for dz in range(-1, 2):
+                company += counts[x + dx, y + dy, z + dz] > 0
+    return company
+
+
 @nb.njit(cache=True, nogil=True)
 def _one_of_each(xyz, low, inverse, shape, counts):
     occupied = 0
@@ -122,6 +139,7 @@ def _one_of_each(xyz, low, inverse, shape, counts):
             occupied += 1
         if counts[x, y, z] < FULL:
             counts[x, y, z] += 1
+    dense = xyz.shape[0] > DENSE * occupied
     kept = np.empty(occupied, np.int64)
     taken = np.zeros((counts.size + 7) // 8, np.uint8)
     count = 0
@@ -136,9 +154,10 @@ def _one_of_each(xyz, low, inverse, shape, counts):
             counts[x - 1, y, z], counts[x + 1, y, z], counts[x, y - 1, z],
             counts[x, y + 1, z], counts[x, y, z - 1], counts[x, y, z + 1],
         )  # fmt: skip
-        if TAIL * counts[x, y, z] >= most:
-            kept[count] = i
-            count += 1
+        if TAIL * counts[x, y, z] < most or (dense and _company(counts, x, y, z) < COMPANY):
+            continue
+        kept[count] = i
+        count += 1
     return kept[:count].copy()
 
 

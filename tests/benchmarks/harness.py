@@ -55,6 +55,8 @@ class Measured:
 
     name: str
     seconds: list[float] = field(default_factory=list)
+    cpu_seconds: list[float] = field(default_factory=list)
+    """of all threads; suffers less than `seconds` when the machine is busy"""
     above_mb: float | None = None
     """peak above what was resident before the run; None where the system does not say"""
     peak_mb: float | None = None
@@ -75,6 +77,7 @@ class Measured:
     def add(self, reply: dict[str, Any]) -> None:
         """Take in one run."""
         self.seconds.append(reply["seconds"])
+        self.cpu_seconds.append(reply["cpu_seconds"])
         self.above_mb = _most(self.above_mb, reply["above_mb"])
         self.peak_mb = _most(self.peak_mb, reply["peak_mb"])
         self.others = max(self.others, reply["others"])
@@ -85,6 +88,7 @@ class Measured:
         return {
             "case": self.name,
             "seconds": self.median_s,
+            "cpu_seconds": statistics.median(self.cpu_seconds),
             "runs": len(self.seconds),
             "all_seconds": self.seconds,
             "above_mb": self.above_mb,
@@ -185,10 +189,10 @@ def _one_run(prepared: Prepared) -> dict[str, Any]:
     _give_back()
     before = _resident("VmRSS")
     _reset_peak()
-    others, start = _Others(), time.perf_counter()
+    others, start, cpu_start = _Others(), time.perf_counter(), time.process_time()
     result = prepared.run()
-    seconds = time.perf_counter() - start
-    reply = {"seconds": seconds, "others": others.cores()}
+    seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
+    reply = {"seconds": seconds, "cpu_seconds": cpu_seconds, "others": others.cores()}
     peak = _resident("VmHWM")
     reply["peak_mb"] = peak
     reply["above_mb"] = None if peak is None or before is None else peak - before

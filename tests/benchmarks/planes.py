@@ -84,7 +84,11 @@ def _targets(n: int, found: dict[str, Measured], seeds: Measured) -> list[Target
     worst = seeds.figures["angle_worst_deg"], seeds.figures["offset_worst_mm"]
     bound = {500_000: 0.05, 2_000_000: 0.01}.get(n)
     ratio = found[OURS].ratio(found.get(SEGMENT))
-    time = [] if bound is None else [Target(f"{points}: time / segment_plane", ratio, bound, "x")]
+    time = (
+        []
+        if bound is None
+        else [Target(f"{points}: time / segment_plane", ratio, bound, "x", of_time=True)]
+    )
     return [
         *time,
         Target(f"{points}: median angle error", ours.get("angle_deg"), 0.02, " deg"),

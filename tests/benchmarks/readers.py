@@ -109,7 +109,7 @@ def readers(quick: bool) -> Report:
             rows[-2]["ratio"] = ratio
             if format_.bound is not None:
                 what = f"{format_.suffix.upper()}: time / {format_.rival_name}"
-                report.targets.append(Target(what, ratio, format_.bound, "x"))
+                report.targets.append(Target(what, ratio, format_.bound, "x", of_time=True))
         report.tables.append(Table("reading", COLUMNS, rows))
         stored, size = _store(Path(folder), rounds)
     report.tables.append(stored)

@@ -49,9 +49,7 @@ SETS = (
     ScanSet("ipad_430_db", ("ipad_lidar_ceilings/pix4d_database_430_db.ply",)),
     ScanSet("ipad_560_db", ("ipad_lidar_ceilings/pix4d_database_560_db.ply",)),
     ScanSet("ipad_560_user", ("ipad_lidar_ceilings/pix4d_user_560_user.ply",)),
-    ScanSet(
-        "kitchen_cloud", ("kinect_kitchen_7scenes/registered_gravity_aligned_2cm.ply",)
-    ),
+    ScanSet("kitchen_cloud", ("kinect_kitchen_7scenes/registered_gravity_aligned_2cm.ply",)),
     ScanSet(
         "kitchen_frames",
         ("kinect_kitchen_7scenes",),

@@ -4,13 +4,18 @@ import json
 import os
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flows.cli import main
+from flows.params import parse_params
+from flows.request import StoreyRequest
+from flows.settings import load_settings
 from storage.points import PointCloud
+from storage.runs import Run, goes_on, read_runs, recorded
 from storage.snapshots import none
 from tasks.scans.bundle import write_bundle
 from tasks.simulation.clouds import furnished_room
@@ -107,6 +112,9 @@ def test_named_queries_are_listed_with_what_they_answer(mapsense):
          "setting 'hough.gamma_cell' = -2: input should be greater than 0"),
         (("map", "x", "--building", "b", "--storey", "0", "--set", "gamma_cell"),
          "--set gamma_cell: expected STAGE.NAME=VALUE"),
+        (("map", "x", "--building", "b", "--storey", "0", "--crop", "-1,2"),
+         "--crop -1,2: expected xmin,ymin,zmin,xmax,ymax,zmax"),
+        (("map", "x", "--building", "b", "--storey", "0", "--up", "-w"), "setting 'scans.up' ="),
         (("map", "x", "--building", "../b", "--storey", "0"), "'../b' is no usable name"),
         (("map", "--building", "b", "--storey", "0"), "no scan named"),
         (("map", "missing", "--building", "b", "--storey", "0"),
@@ -166,3 +174,39 @@ def test_the_command_serves_prefect_by_itself(cloud, prefect_home, tmp_path):
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["found"]["rooms"] == 1
     assert done.stderr == ""
+
+
+def test_flags_win_over_the_environment_and_that_over_the_file(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mapsense.toml").write_text(
+        "store = 'file'\njobs = 3\n[params.hough]\ngamma_cell = 1\nseed = 1\nmisses = 1\n"
+    )
+    monkeypatch.setenv("MAPSENSE_STORE", "environment")
+    monkeypatch.setenv("MAPSENSE_PARAMS__HOUGH__GAMMA_CELL", "2")
+    monkeypatch.setenv("MAPSENSE_PARAMS__HOUGH__SEED", "2")
+    settings = load_settings(store=None, jobs=None, params={"hough": {"gamma_cell": 3}})
+    assert (settings.store, settings.jobs) == (Path("environment"), 3)
+    hough = parse_params(settings.params).hough
+    assert (hough.gamma_cell, hough.seed, hough.misses) == (3, 2, 1)
+    assert load_settings(store=Path("flag")).store == Path("flag")
+
+
+def test_a_run_whose_process_died_is_shown_as_interrupted_and_run_again(
+    mapsense, served, cloud, tmp_path
+):
+    write_bundle(tmp_path / "a.scan", cloud, none())
+    request = StoreyRequest(
+        store=str(tmp_path / "store"), building="hut", storey="0", scans=(str(tmp_path / "a.scan"),)
+    )
+    run = Run(request.run, "map", "hut", "0", request.model_dump_json(), datetime.now(UTC))
+    with recorded(request.store, run):
+        row = read_runs(request.store)[0]
+        path = next((tmp_path / "store" / "runs").rglob("*.parquet"))
+        as_it_went_on = path.read_bytes()
+        assert goes_on(request.store, row)
+    path.write_bytes(as_it_went_on)
+    _, out, _ = mapsense("status", "--json", "--store", "store")
+    assert json.loads(out)[0]["state"] == "interrupted"
+    code, out, _ = mapsense("rerun", "--store", "store")
+    assert code == 0
+    assert "hut/0: 1 room, " in out

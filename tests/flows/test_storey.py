@@ -9,12 +9,16 @@ import pytest
 from flows.params import MapSenseParams
 from flows.request import StoreyRequest
 from storage.catalog import run_query
+from storage.coverage import Coverage
+from storage.faces import Faces
 from storage.plan_geojson import read_plan
 from storage.points import PointCloud
+from storage.rooms import Rooms
 from storage.runs import read_runs
 from storage.snapshots import none
 from tasks.scans.bundle import write_bundle
 from tasks.simulation.clouds import furnished_room
+from tasks.surfaces.intersection import IntersectParams
 
 
 @pytest.fixture(scope="module")
@@ -154,3 +158,28 @@ def test_a_broken_storey_stops_no_other(prefect_server, scans, tmp_path):
     assert state.is_failed()
     assert state.message.startswith("1 of 2 storeys failed: 0: none of 1 scans could be used")
     assert (Path(store) / "plans" / "hut" / "1" / "plan.geojson").is_file()
+
+
+def test_a_stage_over_all_scans_that_raises_fails_the_run_and_keeps_what_was_computed(
+    mapped, monkeypatch, tmp_path
+):
+    from flows import stages
+    from tasks.stage.declare import stage
+
+    def broken(faces: Faces, coverage: Coverage, params: IntersectParams) -> Rooms:
+        raise ZeroDivisionError("no\nluck")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(stages, "rooms", stage(broken, name="rooms"))
+        state, summary, counts = mapped()
+    assert state.is_failed()
+    assert (summary["state"], summary["message"]) == ("failed", "ZeroDivisionError: no")
+    assert counts["failed"] == {"rooms": 1}
+    failures = run_query(tmp_path / "store", "failures").to_pylist()
+    assert {(row["stage"], row["error"]) for row in failures} == {
+        ("rooms", "ZeroDivisionError: no"),
+        ("(run)", "ZeroDivisionError: no"),
+    }
+    _, summary, counts = mapped()
+    assert counts["computed"] == {"rooms": 1}
+    assert summary["state"] == "completed"

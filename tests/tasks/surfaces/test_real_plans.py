@@ -27,11 +27,11 @@ FREIBURG = "freiburg_079_floor/fr_079_occupied.ply"
 
 
 @cache
-def found_rooms(path):
-    """Return the room polygons found in a scan."""
+def found_rooms(path, seed=0):
+    """Return the room polygons found in a scan with draws from a seed."""
     source = Source(name="scan", path=str(DATA / path), sha256="", size_bytes=0)
     points, snapshots, _ = read_scan(source, ReadParams())
-    planes, labels = detect_planes(points, HoughParams())
+    planes, labels = detect_planes(points, HoughParams(seed=seed))
     segments = extract_segments(points, snapshots, planes, labels, FilterParams())
     rooms, _, _ = intersect_walls(*label_surfaces([segments], LabelParams()), IntersectParams())
     return list(rooms.polygons)
@@ -75,6 +75,14 @@ def test_most_rooms_of_a_real_storey_are_found(path, least):
     assert all(p.is_valid for p in found)
 
 
+@pytest.mark.xfail(
+    strict=True,
+    reason="seeds 1 to 5 give an F1 of 0.37 to 0.62 in the sparse Freiburg scan, seed 0 0.79",
+)
+def test_the_rooms_of_a_sparse_scan_do_not_hang_on_the_seed():
+    assert f1(found_rooms(FREIBURG, seed=1), true_rooms(truth_of(FREIBURG))) >= 0.7
+
+
 @pytest.mark.parametrize(
     ("path", "lines", "least"), [(OFFICE, "room_faces", 0.85), (FREIBURG, "walls", 0.8)]
 )
@@ -87,13 +95,21 @@ def test_the_rooms_found_in_a_real_storey_do_not_overlap():
     assert shapely.union_all(found).area == pytest.approx(sum(p.area for p in found), rel=1e-6)
 
 
-def test_a_scan_turned_and_with_points_far_outside_gives_the_same_plan():
-    truth = truth_of(OFFICE)
-    turn = np.array(truth["raw_to_aligned"])
+def raw_office():
+    """Return the rooms found in the raw scan of the office, moved into the aligned frame."""
+    turn = np.array(truth_of(OFFICE)["raw_to_aligned"])
     matrix = [*turn[:2, :2].ravel(), *turn[:2, 3]]
-    raw = [affinity.affine_transform(p, matrix) for p in found_rooms(OFFICE_RAW)]
-    aligned = found_rooms(OFFICE)
+    return [affinity.affine_transform(p, matrix) for p in found_rooms(OFFICE_RAW)]
+
+
+def test_a_scan_turned_and_with_points_far_outside_gives_the_same_rooms():
+    raw, aligned = raw_office(), found_rooms(OFFICE)
     assert (matched(raw, aligned) > 0.8).sum() >= 10
-    in_both = np.minimum(matched(raw, true_rooms(truth)), matched(aligned, true_rooms(truth)))
+    true = true_rooms(truth_of(OFFICE))
+    in_both = np.minimum(matched(raw, true), matched(aligned, true))
     assert (in_both >= 0.8).sum() >= 10
-    assert sum(p.area for p in raw) == pytest.approx(sum(p.area for p in aligned), rel=0.03)
+
+
+def test_what_is_seen_through_the_windows_is_no_room():
+    building = shapely.union_all(true_rooms(truth_of(OFFICE))).convex_hull.buffer(1)
+    assert all(p.intersection(building).area > 0.8 * p.area for p in raw_office())

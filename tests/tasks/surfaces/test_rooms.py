@@ -15,6 +15,7 @@ from storage.rooms import Rooms
 from storage.snapshots import Snapshots, none
 from tasks.simulation.plan import StoreyParams, make_storey
 from tasks.simulation.scans import CampaignParams, simulate_scans
+from tasks.simulation.sensor import SensorParams
 from tasks.surfaces.corners import room_corners
 from tasks.surfaces.filtering import FilterParams, extract_segments
 from tasks.surfaces.hough import HoughParams, detect_planes
@@ -334,7 +335,7 @@ def test_corners_of_a_leaning_room_are_found_where_they_were_sampled():
 def demo_storey():
     """Return a simulated storey and its initial model from one scan a room and two more."""
     plan = make_storey(StoreyParams(seed=1), "demo", "0")
-    params = CampaignParams(second_scans=2)
+    params = CampaignParams(second_scans=2, sensor=SensorParams(rays=3000))
     segments = []
     for _, cloud, snapshots in simulate_scans(plan, params):
         planes, labels = detect_planes(cloud, HoughParams())

@@ -1,0 +1,60 @@
+"""The comparison of the demo, and the plan made of tables."""
+
+import numpy as np
+import pytest
+from shapely import box
+
+from flows.demo import compare_rooms
+from flows.initial_model import initial_plan
+from storage.plan import Plan, PlanRoom
+from storage.plan_geojson import read_plan, write_plan
+from storage.rooms import Rooms
+from storage.walls import Walls
+
+
+def plan(*boxes):
+    rooms = tuple(PlanRoom(f"r{i}", box(*b), name=f"Room {i}") for i, b in enumerate(boxes))
+    return Plan("b", "0", rooms)
+
+
+def test_rooms_are_matched_by_what_they_share():
+    truth = plan((0, 0, 4, 5), (4, 0, 8, 5), (20, 0, 24, 5))
+    mapped = plan((4, 0, 8, 5), (0, 0, 3, 5))
+    first, second, missed = compare_rooms(truth, mapped)
+    assert (first.truth_m2, first.mapped_m2, first.iou) == (20, 15, 0.75)
+    assert (second.mapped_m2, second.iou) == (20, 1.0)
+    assert (missed.mapped_m2, missed.iou) == (None, 0.0)
+
+
+def test_a_mapped_room_matches_one_room_only():
+    first, second = compare_rooms(plan((0, 0, 4, 5), (4, 0, 6, 5)), plan((0, 0, 6, 5)))
+    assert first.iou == pytest.approx(20 / 30, abs=1e-3)
+    assert second.mapped_m2 is None
+
+
+def test_a_plan_keeps_what_is_unknown_unknown(tmp_path):
+    nan = np.nan
+    rooms = Rooms(
+        polygons=np.array([box(0, 0, 4, 5), box(4, 0, 8, 5)]),
+        floor_m=np.array([0.0, nan]),
+        ceiling_m=np.array([2.5, nan]),
+        seen=np.ones(2),
+        walled=np.ones(2),
+        scans=((0, 2), ()),
+    )
+    walls = Walls(
+        lines=np.array([[[4.0, 0], [4, 5]], [[0, 0], [4, 0]]]),
+        thickness_m=np.array([0.1, nan]),
+        base_m=np.array([0.0, nan]),
+        top_m=np.array([2.5, nan]),
+        rooms=np.array([[0, 1], [0, -1]], np.int32),
+        seen=np.ones(2),
+    )
+    made = initial_plan("b", "0", rooms, walls, ["a", "b", "c"], notes=["a note"])
+    write_plan(made, tmp_path / "plan.geojson")
+    made = read_plan(tmp_path / "plan.geojson")
+    assert [room.scans for room in made.rooms] == [("a", "c"), ()]
+    assert [(room.floor_m, room.ceiling_m) for room in made.rooms] == [(0.0, 2.5), (None, None)]
+    assert [wall.rooms for wall in made.walls] == [("r0", "r1"), ("r0",)]
+    assert [wall.thickness_m for wall in made.walls] == [0.1, None]
+    assert made.notes == ("a note",)
