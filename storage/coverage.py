@@ -1,4 +1,4 @@
-"""Where a storey's floor and ceiling were seen, and by how many scans."""
+"""Where a storey was seen from inside, its floor and ceiling, and by which scans."""
 
 import json
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from storage.artifacts import Kind, column, register, schema
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """k plan cells in which floor or ceiling was seen; entry i is one cell everywhere.
+    """k plan cells in which floor, ceiling or furniture was seen; entry i is one everywhere.
 
     Cell (x, y) covers [x cell_m, (x + 1) cell_m) and likewise along y, building frame.
     """

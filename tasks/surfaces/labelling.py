@@ -44,7 +44,7 @@ def label_surfaces(scans: list[Segments], params: LabelParams) -> tuple[Faces, C
 
 
 def _coverage(scans: list[Segments], levels: Levels, params: LabelParams) -> Coverage:
-    """Rasterise floor and ceiling of all scans, the lowest floor and the highest ceiling a cell."""
+    """Rasterise what all scans saw, the lowest floor and the highest ceiling of each cell."""
     cell = scans[0].cell_m if scans else 0.1
     rows: list[NDArray[np.float64]] = [np.empty((0, 5))]
     for number, scan in enumerate(scans):
@@ -57,7 +57,8 @@ def _coverage(scans: list[Segments], levels: Levels, params: LabelParams) -> Cov
             at = np.argwhere(raster.cells) + np.rint(np.array(raster.start) / cell).astype(int)
             row = np.full((len(at), 5), np.nan)
             row[:, :2], row[:, 4] = at, number
-            row[:, 2 if role == "floor" else 3] = height
+            if role != "within":  # a table's top says that there is a room, not how high it is
+                row[:, 2 if role == "floor" else 3] = height
             rows.append(row)
     seen = np.concatenate(rows)
     cells, which = np.unique(seen[:, :2].astype(np.int32), axis=0, return_inverse=True)

@@ -88,11 +88,14 @@ def _walls_stand_on(scans: list[Segments], level: float) -> bool:
 
 
 def role_of(height: float, levels: Levels, params: LabelParams) -> str | None:
-    """Return whether a horizontal segment at a height is floor or ceiling; None for neither."""
-    if levels.floor is not None and height < levels.floor + 3 * LEVEL_STEP:
-        return "floor" if height > levels.floor - 3 * LEVEL_STEP else None
-    if levels.ceiling is None or height > levels.ceiling + 3 * LEVEL_STEP:
+    """Return whether a horizontal segment is floor, ceiling or stands within; None for neither."""
+    step = 3 * LEVEL_STEP
+    if levels.ceiling is not None and height > levels.ceiling + step:
         return None
     if levels.floor is None:  # no floor to stand on: what lies within a storey's mixed ceilings
-        return "ceiling" if height > levels.ceiling - MIXED else None
-    return "ceiling" if height >= levels.floor + params.headroom_m else None
+        over = levels.ceiling is not None and height > levels.ceiling - MIXED
+        return "ceiling" if over else None
+    if height < levels.floor + step:
+        return "floor" if height > levels.floor - step else None
+    over = levels.ceiling is not None and height >= levels.floor + params.headroom_m
+    return "ceiling" if over else "within"
