@@ -51,15 +51,15 @@ class IntersectParams(Params):
     """Thickness of the thickest wall with two faces, metres."""
     unseen_cost: PositiveFloat = 0.05
     """Cost of a square metre indoors that was not seen, against 1 for one outdoors that was."""
-    open_cost: PositiveFloat = 0.4
+    open_cost: PositiveFloat = 0.6
     """Cost of a metre of the building's limit on which no wall was seen."""
-    wall_low: float = Field(default=0.3, ge=0, le=1)
+    wall_low: float = Field(default=0.6, ge=0, le=1)
     """How much of a wall is seen where only something lower than a lintel was."""
-    wall_over: float = Field(default=0.4, ge=0, le=1)
+    wall_over: float = Field(default=0.2, ge=0, le=1)
     """How much of a wall is seen where the floor runs on beneath."""
     unknown_open: float = Field(default=0.35, ge=0, le=1)
     """How open a place is on which neither a wall was seen nor the floor or ceiling running on."""
-    open_share: float = Field(default=0.3, ge=0, le=1)
+    open_share: float = Field(default=0.25, ge=0, le=1)
     """Share of their common border from which two cells are one room."""
     min_area_m2: PositiveFloat = 1.0
     """Smallest room, square metres."""
