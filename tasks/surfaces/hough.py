@@ -51,15 +51,20 @@ class HoughParams(Params):
     """Share of a tile's points at which the search ends. Not in the paper."""
     tries: PositiveInt = 100_000
     """Draws without a plane after which the wide pass ends. Not in the paper."""
-    tries_near: PositiveInt = 150_000
-    """Draws without a plane after which the narrow pass ends. Not in the paper."""
-    misses: PositiveInt = 6
+    draws_near: PositiveInt = 200
+    """Draws for each point left, without a plane, after which the narrow pass ends. Not in the
+    paper."""
+    misses: PositiveInt = 12
     """Full cells in a row that turn out to be no plane, after which a pass ends. Not in the
     paper."""
     seed: int = 0
     """Seed of the draws. Not in the paper."""
 
 
+FEWEST_DRAWS = 20_000
+"""Draws in which a patch that is there at all would have been met."""
+NARROWEST = 0.01
+"""Breadth below which a patch is a line of points, metres."""
 WIDE = 50.0
 """Extent beyond which a cloud may hold more than its storey, metres."""
 
@@ -187,6 +192,8 @@ def _patch(
     inside, area = patches.largest_cluster(xyz[near], normal, cell)
     if area < params.min_area_m2 or inside.sum() < MIN_POINTS:
         return None
+    if patches.breadth(xyz[near[inside]]) < NARROWEST:
+        return None
     normal, offset = patches.fit_plane(xyz[near[inside]])
     wide = np.flatnonzero(_within(xyz, normal, offset, 1.5 * tolerance))
     if len(wide) < MIN_POINTS:
@@ -257,7 +264,7 @@ class _Ballot:
                 self.accumulator,
                 *self.cells,
                 p.gamma_cell,
-                p.tries_near,
+                max(p.draws_near * len(xyz), FEWEST_DRAWS),
                 state,
                 *self.log,
             )

@@ -3,7 +3,9 @@
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay, QhullError, cKDTree
 
 
 def alpha_shape(points: NDArray[np.float64], radius: float) -> shapely.Polygon:
@@ -28,7 +30,7 @@ def alpha_shape(points: NDArray[np.float64], radius: float) -> shapely.Polygon:
     corners = points[triangles]
     kept = corners[_circumradius(corners) <= radius]
     if not len(kept):
-        return _thin_box(points, radius)
+        return _thin_box(_together(points, 2 * radius), radius)
     union = shapely.coverage_union_all(shapely.polygons(kept))  # triangles share their edges
     parts = shapely.get_parts(union)
     parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
@@ -42,6 +44,14 @@ def _triangles(points: NDArray[np.float64]) -> NDArray[np.int32] | None:
         return Delaunay(points - points.mean(axis=0)).simplices
     except QhullError:  # all on one line
         return None
+
+
+def _together(points: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+    """Return the largest group of points that gaps up to this width hold together."""
+    pairs = cKDTree(points).query_pairs(gap, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
+    group = connected_components(graph, directed=False)[1]
+    return points[group == np.bincount(group).argmax()]
 
 
 def _circumradius(corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -59,7 +59,7 @@ class IntersectParams(Params):
     """How much of a wall is seen where the floor runs on beneath."""
     unknown_open: float = Field(default=0.35, ge=0, le=1)
     """How open a place is on which neither a wall was seen nor the floor or ceiling running on."""
-    open_share: float = Field(default=0.25, ge=0, le=1)
+    open_share: float = Field(default=0.3, ge=0, le=1)
     """Share of their common border from which two cells are one room."""
     min_area_m2: PositiveFloat = 1.0
     """Smallest room, square metres."""

@@ -35,6 +35,13 @@ def fit_plane(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], float]:
     return normal, float(normal @ centre)
 
 
+def breadth(xyz: NDArray[np.float32]) -> float:
+    """Return how broad a patch is across its longest direction, metres, as if evenly filled."""
+    local = xyz - xyz.mean(axis=0, dtype=np.float64)
+    across = np.linalg.eigvalsh(local.T @ local)[1] / len(xyz)
+    return float(np.sqrt(12 * max(across, 0.0)))
+
+
 def plane_axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return two unit vectors spanning the plane with this unit normal; the first is level."""
     level = np.cross([0.0, 0.0, 1.0], normal)

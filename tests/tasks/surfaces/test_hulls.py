@@ -112,10 +112,6 @@ def test_the_hull_is_a_valid_part_of_the_convex_hull(xy, radius):
     assert hull.difference(shapely.MultiPoint(xy).convex_hull.buffer(1e-9)).area < 1e-9
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="if no triangle fits the circle, the box around all points is returned, however wide",
-)
 def test_places_too_far_apart_for_the_circle_span_no_area():
     three = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]])
     assert alpha_shape(three, 0.3).area < alpha_shape(three, 5.0).area
