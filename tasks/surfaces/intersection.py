@@ -74,6 +74,8 @@ OUTLINE_EXTENSION = 1.0
 storey."""
 SLIVER = 0.1
 """Half the width below which a part of a room is an artefact of nearly equal lines, metres."""
+IN_LINE = 0.01
+"""A corner this near to the line of its neighbours is none, metres."""
 WALLED, UNWALLED = 0.5, 0.25
 """Share of the outline from which a hardly seen room is believed, and below which half of it must
 have been seen: what lies outside a window has a floor too, but no walls."""
@@ -274,8 +276,14 @@ def _tidy(polygon: shapely.Geometry) -> list[shapely.Polygon]:
     """Return the parts of a room without slivers, holes and corners in line."""
     mitre = {"join_style": "mitre", "mitre_limit": 3.0}
     opened = polygon.buffer(-SLIVER, **mitre).buffer(SLIVER, **mitre)
-    parts = [p for p in shapely.get_parts(opened) if p.geom_type == "Polygon" and p.area > 0]
-    return [shapely.Polygon(p.exterior).simplify(0.01) for p in parts]
+    outlines = [shapely.Polygon(p.exterior) for p in _polygons(opened)]
+    # rounded here, so that a plan written with four decimals is as simple as the room it shows
+    rounded = [shapely.set_precision(p.simplify(IN_LINE), cut.SNAP) for p in outlines]
+    return [shapely.Polygon(p.exterior) for r in rounded for p in _polygons(r)]
+
+
+def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    return [p for p in shapely.get_parts(geometry) if p.geom_type == "Polygon" and p.area > 0]
 
 
 def _with_coverage(

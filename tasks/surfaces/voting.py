@@ -97,6 +97,22 @@ def _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre):
     return (first_of_row[row] + column) * rho_cells + min(np.int64(rho * per_metre), rho_cells - 1)
 
 
+@nb.njit(inline="always")
+def _cast(
+    xyz, i, j, k, accumulator, cells_of_row, first_of_row, rho_cells, per_metre, touched, votes,
+    logged,
+):  # fmt: skip
+    """Cast and log the vote of three points; return its cell, -1 if they lie on a line."""
+    nx, ny, nz, rho = _plane_through(xyz, i, j, k)
+    if nx == 0 and ny == 0 and nz == 0:
+        return -1
+    cell = _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre)
+    accumulator[cell] += 1
+    touched[logged] = cell
+    votes[logged, 0], votes[logged, 1], votes[logged, 2], votes[logged, 3] = nx, ny, nz, rho
+    return cell
+
+
 @nb.njit(cache=True, nogil=True)
 def vote_anywhere(
     xyz, beta_min, beta_max, accumulator, cells_of_row, first_of_row, rho_cells, per_metre,
@@ -117,13 +133,12 @@ def vote_anywhere(
             and _in_range(xyz, j, k, low2, high2)
         ):
             continue
-        nx, ny, nz, rho = _plane_through(xyz, i, j, k)
-        if nx == 0 and ny == 0 and nz == 0:
+        cell = _cast(
+            xyz, i, j, k, accumulator, cells_of_row, first_of_row, rho_cells, per_metre,
+            touched, votes, logged,
+        )  # fmt: skip
+        if cell < 0:
             continue
-        cell = _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre)
-        accumulator[cell] += 1
-        touched[logged] = cell
-        votes[logged, 0], votes[logged, 1], votes[logged, 2], votes[logged, 3] = nx, ny, nz, rho
         logged += 1
         if accumulator[cell] >= gamma_cell:
             return _mean_vote(cell, logged, accumulator, touched, votes)
@@ -156,13 +171,12 @@ def vote_nearby(
         k = _neighbour(xyz, i, bins, members, shape, low, edge, reach, low2, high2, state)
         if k < 0 or not _in_range(xyz, j, k, low2, high2):
             continue
-        nx, ny, nz, rho = _plane_through(xyz, i, j, k)
-        if nx == 0 and ny == 0 and nz == 0:
+        cell = _cast(
+            xyz, i, j, k, accumulator, cells_of_row, first_of_row, rho_cells, per_metre,
+            touched, votes, logged,
+        )  # fmt: skip
+        if cell < 0:
             continue
-        cell = _cell_of(nx, ny, nz, rho, cells_of_row, first_of_row, rho_cells, per_metre)
-        accumulator[cell] += 1
-        touched[logged] = cell
-        votes[logged, 0], votes[logged, 1], votes[logged, 2], votes[logged, 3] = nx, ny, nz, rho
         logged += 1
         if accumulator[cell] >= gamma_cell:
             return _mean_vote(cell, logged, accumulator, touched, votes)
