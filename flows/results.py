@@ -1,17 +1,14 @@
 """What a run hands over: the plan, its drawings, and a summary of what was used and found."""
 
 import json
-import os
-import uuid
 from collections import defaultdict
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 from flows.request import StoreyRequest
 from storage import coverage as stored_coverage
-from storage.errors import StoreError
+from storage.files import write_whole
 from storage.plan import Plan
 from storage.plan_geojson import write_plan
 from storage.runs import COMPLETED, FAILED, PARTIAL
@@ -48,17 +45,7 @@ def write_results(request: StoreyRequest, mapped: Mapped) -> None:
     write_plan(mapped.plan, folder / "plan.geojson")
     seen = mapped.coverage
     drawn = Coverage(seen.centres(), seen.cell_m, seen.scans)
-    token = f".{os.getpid()}-{uuid.uuid4().hex[:8]}"
-    drawings = {folder / f"{token}.{kind}": folder / f"plan.{kind}" for kind in ("svg", "png")}
-    try:
-        draw_plan(mapped.plan, drawn, *drawings)
-        for temporary, target in drawings.items():
-            os.replace(temporary, target)
-    except OSError as error:
-        raise _unwritable(folder, error) from error
-    finally:
-        for temporary in drawings:
-            temporary.unlink(missing_ok=True)
+    draw_plan(mapped.plan, drawn, folder / "plan.svg", folder / "plan.png")
 
 
 def summarise(
@@ -99,14 +86,8 @@ def _state(mapped: Mapped | None, skipped: list[Skipped]) -> str:
 
 def write_summary(request: StoreyRequest, summary: dict[str, Any]) -> None:
     """Write summary.json into the folder of the results."""
-    path = request.folder() / "summary.json"
-    temporary = path.with_name(f".{os.getpid()}-{uuid.uuid4().hex[:8]}.json")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(json.dumps(summary, indent=1, ensure_ascii=False) + "\n", "utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise _unwritable(path.parent, error) from error
+    text = json.dumps(summary, indent=1, ensure_ascii=False) + "\n"
+    write_whole(request.folder() / "summary.json", text.encode(), "summary")
 
 
 def stage_costs(rows: list[StageRow]) -> dict[str, dict[str, float | int]]:
@@ -145,10 +126,3 @@ def _found(mapped: Mapped) -> dict[str, Any]:
         "ceiling_m": mapped.coverage.ceiling_level_m,
         "rows": mapped.rows,
     }
-
-
-def _unwritable(folder: Path, error: OSError) -> StoreError:
-    return StoreError(
-        f"{folder}: cannot write the results there ({error.strerror or error}); make the folder "
-        "writable, free space on its disk, or choose another with --out"
-    )

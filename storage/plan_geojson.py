@@ -4,11 +4,8 @@ Every feature carries every property of its kind, so a misspelt name is a missin
 `width_m` follow from the geometry: they are written for other tools and only compared on reading.
 """
 
-import contextlib
 import json
 import math
-import os
-import uuid
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,7 +13,8 @@ from typing import Any, NoReturn
 import shapely
 from shapely import LineString, Polygon
 
-from storage.errors import InputError, StoreError
+from storage.errors import InputError
+from storage.files import write_whole
 from storage.plan import Plan, PlanFurniture, PlanOpening, PlanRoom, PlanWall
 
 KINDS = ("room", "wall", "door", "window", "furniture")
@@ -43,21 +41,8 @@ def write_plan(plan: Plan, path: Path | str) -> None:
     path = Path(path)
     document = to_geojson(plan)
     from_geojson(document, path)
-    temporary = path.with_name(f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(temporary, "w", encoding="utf-8", newline="\n") as file:
-            file.write(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        with contextlib.suppress(OSError):  # what stopped the writing may stop this too
-            temporary.unlink()
-        raise StoreError(
-            f"{path}: cannot write the plan ({error.strerror or error}); make the folder writable, "
-            "free space on its disk, or choose another with --out"
-        ) from error
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_whole(path, text.encode(), "plan")
 
 
 def read_plan(path: Path | str) -> Plan:

@@ -1,9 +1,6 @@
 """The sheet a plan is drawn on: its size, its scale, and pens that draw shapely geometry."""
 
-import contextlib
-import os
 import threading
-import uuid
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from storage.errors import StoreError
+from storage.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,25 +115,7 @@ def save(sheet: Sheet, path: Path | str) -> None:
     with _save_lock, matplotlib.rc_context(settings):
         suffix = path.suffix.lower()
         sheet.figure.savefig(data, format=suffix[1:], dpi=DPI, metadata=metadata[suffix])
-    _replace(path, data.getvalue())
-
-
-def _replace(path: Path, data: bytes) -> None:
-    temporary = path.with_name(f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(temporary, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        with contextlib.suppress(OSError):  # what stopped the writing may stop this too
-            temporary.unlink()
-        raise StoreError(
-            f"{path}: cannot write the drawing ({error.strerror or error}); make the folder "
-            "writable, free space on its disk, or choose another with --out"
-        ) from error
+    write_whole(path, data.getvalue(), "drawing")
 
 
 def text_width(text: str, size_pt: float) -> float:
