@@ -27,7 +27,8 @@ class Levels:
 def find_levels(scans: list[Segments], params: LabelParams) -> Levels:
     """Find floor and ceiling: the lowest and highest level of room extent (Eq. 6, 7).
 
-    A cloud with one level only is asked on which side of it its walls lie.
+    Where no two levels are a room's height apart there is only one, the largest; whether it is
+    floor or ceiling is told by the side its walls lie on.
     """
     heights, areas = _horizontals(scans)
     if not len(heights):
@@ -35,9 +36,10 @@ def find_levels(scans: list[Segments], params: LabelParams) -> Levels:
     large = _large_levels(heights, areas, params)
     floor, ceiling = float(large.min()), float(large.max())
     if ceiling - floor < params.headroom_m:
-        if _walls_stand_on(scans, floor):
-            return Levels(floor, None, None)
-        return Levels(None, ceiling, ceiling)
+        largest = float(large[0])  # what lies near it is a shelf or a suspended part of it
+        if _walls_stand_on(scans, largest):
+            return Levels(largest, None, None)
+        return Levels(None, largest, largest)
     above = heights > floor + params.headroom_m
     order = np.argsort(heights[above])
     share = np.cumsum(areas[above][order]) / areas[above].sum()
@@ -57,7 +59,7 @@ def _horizontals(scans: list[Segments]) -> tuple[NDArray[np.float64], NDArray[np
 def _large_levels(
     heights: NDArray[np.float64], areas: NDArray[np.float64], params: LabelParams
 ) -> NDArray[np.float64]:
-    """Return the mean heights of the levels of room extent; the largest one at least.
+    """Return the mean heights of the levels of room extent, largest first; one at least.
 
     Levels are taken largest first, each with what lies within a step of it: chains of tops and
     shelves would lead from the floor to the ceiling.

@@ -144,6 +144,14 @@ def test_a_cloud_with_only_a_ceiling_gets_no_floor():
     assert coverage.ceiling_m == pytest.approx(np.full(len(coverage), HEIGHT))
 
 
+def test_a_suspended_part_of_the_ceiling_is_no_floor():
+    upper = [wall(p, q, 1.4) for p, q in [((0, 0), (5, 0)), ((5, 0), (5, 4)), ((5, 4), (0, 4))]]
+    suspended = level(1, 1, 4, 3, HEIGHT - 0.6)
+    _, coverage = labelled([level(0, 0, 5, 4, HEIGHT), suspended, *upper])
+    assert coverage.floor_level_m is None
+    assert coverage.ceiling_level_m == pytest.approx(HEIGHT)
+
+
 def test_a_cloud_with_only_a_floor_gets_no_ceiling():
     faces, coverage = labelled(room(0, 0, 5, 4, ceiling=False))
     assert coverage.ceiling_level_m is None
