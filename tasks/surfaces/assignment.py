@@ -36,14 +36,18 @@ def label_all(
     for xyz in (points.xyz[::stride], points.xyz):
         hit, sums = _assign(xyz, prints, normals, offsets, tolerance, cell, tile, every)
         fitted, at, rms = Moments(sums).planes()
-        good = sums[:, 9] >= 3
+        # a handful of a large cloud's sample says less than the thinned points did
+        good = sums[:, 9] >= (3 if len(xyz) == len(points) else MIN_POINTS)
         normals = np.where(good[:, None], fitted, normals)
         offsets = np.where(good, at, offsets)
-        prints = [
-            _dilated(patches.Footprint(p.u, p.v, p.low, h), 1)
-            for p, h in zip(prints, hit, strict=True)
-        ]
+        prints = [_dilated(_reached(p, h, stride), 1) for p, h in zip(prints, hit, strict=True)]
     return _ordered(points, every, normals, offsets, rms, sums[:, 9].astype(np.int64))
+
+
+def _reached(print_: patches.Footprint, hit: NDArray[np.bool_], stride: int) -> patches.Footprint:
+    """Return the cells that got a point; a sample of the points does not get into every cell."""
+    cells = hit if stride == 1 and hit.any() else print_.cells
+    return patches.Footprint(print_.u, print_.v, print_.low, cells)
 
 
 def _dilated(print_: patches.Footprint, cells: int) -> patches.Footprint:

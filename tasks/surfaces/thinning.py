@@ -22,7 +22,7 @@ FULL = 255
 """Points of a voxel that are counted."""
 DENSE = 2
 """Points per occupied voxel from which surfaces fill their voxels, and a voxel alone is clutter."""
-COMPANY = 3
+COMPANY = 2
 """Occupied neighbours, of 26, a voxel of a surface has at least."""
 TAIL = 4
 """A voxel with fewer than a fourth of a neighbour's points holds the tail of its noise."""

@@ -130,6 +130,14 @@ def test_a_cloud_without_a_plane_has_none_failure(xyz):
     assert len(labels.labels) == len(xyz)
 
 
+def test_a_thinly_seen_wall_beside_a_densely_seen_floor_is_kept():
+    dense = rectangle((0, 0, 0), (3, 3, 0), 1_200_000, 1)
+    thin = rectangle((0, 3, 0), (3, 3, 2), 900, 2)
+    planes, labels = detect_planes(cloud(np.concatenate([dense, thin])), HoughParams())
+    assert len(planes) == 2
+    assert (labels.labels[-900:] == 1).mean() > 0.9
+
+
 def test_the_same_seed_gives_the_same_bytes():
     xyz, _ = furnished_room(100_000, seed=5)
     first, second = (detect_planes(cloud(xyz), HoughParams(seed=3)) for _ in range(2))
