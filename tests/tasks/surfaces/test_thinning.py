@@ -32,11 +32,11 @@ BESIDE = [s for s in AROUND if np.abs(s).sum() == 1]
 
 def is_surface(voxel, counts):
     """Return whether a voxel is neither the tail of a neighbour's noise nor, in a cloud with over
-    two points a voxel, one with fewer than three occupied neighbours."""
+    two points a voxel, one with fewer than two occupied neighbours."""
     beside = [counts[tuple(np.add(voxel, s))] for s in BESIDE]
     company = sum(counts[tuple(np.add(voxel, s))] > 0 for s in AROUND)
     dense = counts.total() > 2 * sum(n > 0 for n in counts.values())
-    return 4 * counts[voxel] >= max(beside) and (company >= 3 or not dense)
+    return 4 * counts[voxel] >= max(beside) and (company >= 2 or not dense)
 
 
 def slowly_thinned(xyz):
