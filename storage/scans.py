@@ -13,7 +13,7 @@ class Scan:
 
     name: str
     format: str
-    """ply, pcd, xyz, las, e57, depth or bundle"""
+    """ply, pcd, xyz, las, e57, depth, 3dtk or bundle"""
     points_read: int
     """points in the file"""
     points_kept: int

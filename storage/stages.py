@@ -18,8 +18,6 @@ import pyarrow.parquet as pq
 from storage.artifacts import Place, column, replace_table, schema
 from storage.errors import MapSenseError
 
-OUTCOMES = ("computed", "cached", "failed")
-
 
 @dataclass(frozen=True)
 class StageRow:

@@ -23,7 +23,8 @@ def outline_lines(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return normals (k, 2), offsets (k,) and spans (k, 2) of outlines without a wall."""
     kept: list[tuple[NDArray[np.float64], float, tuple[float, float]]] = []
-    for a, b in [*_pieces(coverage), *_limits(coverage, main)]:
+    seen = _image(coverage)
+    for a, b in [*_pieces(*seen), *_limits(*seen, main)]:
         length = float(np.linalg.norm(b - a))
         if length < SHORTEST:
             continue
@@ -56,12 +57,13 @@ def _image(coverage: Coverage) -> tuple[NDArray[np.uint8], NDArray[np.int64], fl
     return np.asarray(opened, np.uint8), low, size
 
 
-def _limits(coverage: Coverage, main: NDArray[np.float64]) -> list[Piece]:
+def _limits(
+    image: NDArray[np.uint8], low: NDArray[np.int64], size: float, main: NDArray[np.float64]
+) -> list[Piece]:
     """Return the four sides of the covered area's box, along the storey's first direction.
 
     The largest covered area only: what was seen apart from it was seen through doors.
     """
-    image, low, size = _image(coverage)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(image, connectivity=8)
     if count < 2:
         return []
@@ -74,9 +76,8 @@ def _limits(coverage: Coverage, main: NDArray[np.float64]) -> list[Piece]:
     return [(p, q) for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
 
 
-def _pieces(coverage: Coverage) -> list[Piece]:
+def _pieces(image: NDArray[np.uint8], low: NDArray[np.int64], size: float) -> list[Piece]:
     """Return the straight pieces of the covered area's outlines, longest first."""
-    image, low, size = _image(coverage)
     contours, _ = cv2.findContours(image, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     pieces = []
     for contour in contours:
