@@ -13,6 +13,7 @@ from tasks.surfaces.filtering import FilterParams
 from tasks.surfaces.hough import HoughParams
 from tasks.surfaces.intersection import IntersectParams
 from tasks.surfaces.label_params import LabelParams
+from tasks.surfaces.occupancy import OccupancyParams
 
 
 class MapSenseParams(Params):
@@ -24,6 +25,8 @@ class MapSenseParams(Params):
     """Plane detection (Sec. 4.1)."""
     filter: FilterParams = FilterParams()
     """Plane filtering (Eq. 5)."""
+    occupancy: OccupancyParams = OccupancyParams()
+    """Occupied space: evidence for walls besides planes."""
     label: LabelParams = LabelParams()
     """Plane labelling (Eq. 6, 7)."""
     intersect: IntersectParams = IntersectParams()

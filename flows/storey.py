@@ -96,13 +96,16 @@ def _map(request: StoreyRequest, sources: list[Source], skipped: list[Skipped]) 
         )
         for n in scans
     }
-    used = [n for n in scans if _is_used(n, (clouds[n], planes[n], segments[n]), skipped)]
+    occupancy = {n: stages.occupancy.submit(scans[n], clouds[n], params.occupancy) for n in scans}
+    made_of = {n: (clouds[n], planes[n], segments[n], occupancy[n]) for n in scans}
+    used = [n for n in scans if _is_used(n, made_of[n], skipped)]
     if not used:
         return None
 
     faces = stages.faces(place, [segments[n].result() for n in used], params.label)
-    rooms = stages.rooms(place, faces, faces, params.intersect)
-    made: list[Ref] = [*faces, *rooms]
+    space = [occupancy[n].result() for n in used]
+    rooms = stages.rooms(place, faces, faces, space, params.intersect)
+    made: list[Ref] = [*faces, *rooms, *space]
     for n in used:
         made += [*clouds[n].result(), *planes[n].result(), segments[n].result()]
     return _mapped(request, used, made, _notes(request, used, skipped))

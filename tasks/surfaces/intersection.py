@@ -17,6 +17,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from storage.corners import Corners
 from storage.coverage import Coverage
 from storage.faces import SEEN_LOW, SEEN_OVER, SEEN_WALL, Faces
+from storage.occupancy import Occupancy
 from storage.rooms import Rooms
 from storage.walls import Walls
 from tasks.params import Params
@@ -26,12 +27,13 @@ from tasks.surfaces.directions import face_angles, frames, off_frames
 from tasks.surfaces.outlines import outline_lines
 from tasks.surfaces.pairing import pair_walls
 from tasks.surfaces.partition import indoors, join_open
+from tasks.surfaces.upright import Columns
 
 
 class IntersectParams(Params):
     """Parameters of plane intersection. None of them is in the paper."""
 
-    min_face_m: PositiveFloat = 0.5
+    min_face_m: PositiveFloat = 0.7
     """Shortest face that cuts a room, metres."""
     long_face_m: PositiveFloat = 2.0
     """Length from which a face cuts at any angle; shorter ones off the storey's directions are
@@ -57,6 +59,9 @@ class IntersectParams(Params):
     """How much of a wall is seen where only something lower than a lintel was."""
     wall_over: float = Field(default=0.2, ge=0, le=1)
     """How much of a wall is seen where the floor runs on beneath."""
+    wall_upright: float = Field(default=0.9, ge=0, le=1)
+    """How much of a wall is seen where points stand from floor to ceiling but no plane was found,
+    or one a little aside."""
     unknown_open: float = Field(default=0.35, ge=0, le=1)
     """How open a place is on which neither a wall was seen nor the floor or ceiling running on."""
     open_share: float = Field(default=0.3, ge=0, le=1)
@@ -82,7 +87,7 @@ have been seen: what lies outside a window has a floor too, but no walls."""
 
 
 def intersect_walls(
-    faces: Faces, coverage: Coverage, params: IntersectParams
+    faces: Faces, coverage: Coverage, occupancy: list[Occupancy], params: IntersectParams
 ) -> tuple[Rooms, Walls, Corners]:
     """Intersect the wall faces of a storey to its initial model.
 
@@ -92,6 +97,9 @@ def intersect_walls(
         Wall faces of the storey.
     coverage : Coverage
         Where floor and ceiling were seen.
+    occupancy : list of Occupancy
+        Where each scan's points lie: what stands from floor to ceiling is a wall, whether or not
+        a plane was found on it.
 
     Returns
     -------
@@ -105,7 +113,7 @@ def intersect_walls(
     if not len(coverage):
         return _empty()
     faces = _cutting(faces, params)
-    plane = _cut_plane(faces, coverage, params)
+    plane = _cut_plane(faces, coverage, Columns(occupancy, coverage), params)
     rooms = _rooms(plane, coverage, params)
     walls = pair_walls(rooms, faces, params.thinnest_m, params.thickest_m)
     return rooms, walls, room_corners(rooms, faces)
@@ -156,7 +164,9 @@ class _Plane:
     open: NDArray[np.float64]
 
 
-def _cut_plane(faces: Faces, coverage: Coverage, params: IntersectParams) -> _Plane:
+def _cut_plane(
+    faces: Faces, coverage: Coverage, columns: Columns, params: IntersectParams
+) -> _Plane:
     lines = cut.carrier_lines(
         faces, params.in_line_m, np.radians(2), 3.0, params.snap_m, params.snap_rad
     )
@@ -168,6 +178,7 @@ def _cut_plane(faces: Faces, coverage: Coverage, params: IntersectParams) -> _Pl
     solid = cut.solid_share(plane, faces, params.thinnest_m, params.thickest_m)
     worth = np.zeros(4)
     worth[[SEEN_LOW, SEEN_OVER, SEEN_WALL]] = params.wall_low, params.wall_over, 1.0
+    wall = cut.wall_share(plane, lines, faces, 0.1, worth)
     return _Plane(
         cut=plane,
         cells=plane.cells,
@@ -177,7 +188,7 @@ def _cut_plane(faces: Faces, coverage: Coverage, params: IntersectParams) -> _Pl
         left=plane.left,
         right=plane.right,
         lengths=np.linalg.norm(plane.edges[:, 1] - plane.edges[:, 0], axis=1),
-        wall=cut.wall_share(plane, lines, faces, 0.1, worth),
+        wall=np.maximum(wall, params.wall_upright * columns.share(plane.edges)),
         open=cut.open_share(plane, coverage),
     )
 

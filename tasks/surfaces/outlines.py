@@ -14,6 +14,8 @@ SHORTEST = 1.5
 """Shortest straight piece that says where a room ends, metres."""
 ALIGNED = np.radians(8)
 """Outlines turned further from the storey's directions are the shadows of things."""
+TOUCHES = 2.5
+"""Cells no further than this from a side, in cells, touch it."""
 BESIDE = 0.4
 """A piece this near to a wall's line is that wall, metres."""
 
@@ -73,7 +75,15 @@ def _limits(
     xy = (np.argwhere(labels == largest) + low + 0.5) * size @ axes.T
     (u0, v0), (u1, v1) = xy.min(axis=0), xy.max(axis=0)
     corners = np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)]) @ axes
-    return [(p, q) for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    depths = (xy[:, 1] - v0, u1 - xy[:, 0], v1 - xy[:, 1], xy[:, 0] - u0)
+    along = (xy[:, 0], xy[:, 1], xy[:, 0], xy[:, 1])
+    # a side that the area touches with a corner only limits nothing
+    return [
+        (p, q)
+        for (p, q), depth, t in zip(sides, depths, along, strict=True)
+        if np.ptp(t[depth < TOUCHES * size]) >= SHORTEST
+    ]
 
 
 def _pieces(image: NDArray[np.uint8], low: NDArray[np.int64], size: float) -> list[Piece]:

@@ -11,6 +11,7 @@ from flows.request import StoreyRequest
 from storage.catalog import run_query
 from storage.coverage import Coverage
 from storage.faces import Faces
+from storage.occupancy import Occupancy
 from storage.plan_geojson import read_plan
 from storage.points import PointCloud
 from storage.rooms import Rooms
@@ -62,7 +63,7 @@ def mapped(prefect_server, tmp_path, scans):
 
 def test_a_storey_is_mapped_and_an_unchanged_rerun_computes_nothing(mapped, tmp_path):
     state, summary, counts = mapped()
-    every = {"clouds": 2, "planes": 2, "segments": 2, "faces": 1, "rooms": 1}
+    every = {"clouds": 2, "planes": 2, "segments": 2, "occupancy": 2, "faces": 1, "rooms": 1}
     assert state.is_completed()
     assert counts == {"computed": every, "cached": {}, "failed": {}}
     assert (summary["state"], summary["skipped"]) == ("completed", [])
@@ -89,7 +90,7 @@ def test_a_changed_parameter_recomputes_its_stage_and_what_follows(mapped):
     params = MapSenseParams.model_validate({"filter": {"cell_m": 0.12}})
     _, _, counts = mapped(params=params)
     assert counts["computed"] == {"segments": 2, "faces": 1, "rooms": 1}
-    assert counts["cached"] == {"clouds": 2, "planes": 2}
+    assert counts["cached"] == {"clouds": 2, "planes": 2, "occupancy": 2}
 
 
 def test_a_broken_scan_is_skipped_with_its_reason_and_made_up_for_later(mapped, scans, clouds):
@@ -108,10 +109,11 @@ def test_a_broken_scan_is_skipped_with_its_reason_and_made_up_for_later(mapped, 
         "clouds": 1,
         "planes": 1,
         "segments": 1,
+        "occupancy": 1,
         "faces": 1,
         "rooms": 1,
     }
-    assert counts["cached"] == {"clouds": 1, "planes": 1, "segments": 1}
+    assert counts["cached"] == {"clouds": 1, "planes": 1, "segments": 1, "occupancy": 1}
 
 
 def test_a_plan_of_some_of_the_scans_says_so(mapped, scans, tmp_path):
@@ -166,7 +168,9 @@ def test_a_stage_over_all_scans_that_raises_fails_the_run_and_keeps_what_was_com
     from flows import stages
     from tasks.stage.declare import stage
 
-    def broken(faces: Faces, coverage: Coverage, params: IntersectParams) -> Rooms:
+    def broken(
+        faces: Faces, coverage: Coverage, occupancy: list[Occupancy], params: IntersectParams
+    ) -> Rooms:
         raise ZeroDivisionError("no\nluck")
 
     with monkeypatch.context() as patched:

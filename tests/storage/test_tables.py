@@ -17,6 +17,7 @@ from storage.corners import Corners
 from storage.coverage import Coverage
 from storage.errors import DamagedArtifact
 from storage.faces import Faces
+from storage.occupancy import Occupancy
 from storage.planes import PlaneLabels, Planes
 from storage.points import PointCloud
 from storage.rooms import Rooms
@@ -126,6 +127,8 @@ VALUES = {
         None,
         None,
     ),
+    "occupancy": Occupancy(np.array([[-7, 0, 3], [5, 1, -2]], np.int32), 1 / 3),
+    "no occupancy": Occupancy(np.empty((0, 3), np.int32), 0.1),
     "rooms": Rooms(
         polygons(
             box(0, 0, 1, 2), TURNED, Polygon([(0, 0), (3, 0), (3, 1), (1, 1), (1, 4), (0, 4)])

@@ -184,7 +184,7 @@ def test_no_scan_and_scans_without_planes_give_nothing(count):
     faces, coverage = label_surfaces([without_planes()] * count, LabelParams())
     assert len(faces) == 0 and len(coverage) == 0
     assert coverage.floor_level_m is None and coverage.ceiling_level_m is None
-    rooms, walls, corners = intersect_walls(faces, coverage, IntersectParams())
+    rooms, walls, corners = intersect_walls(faces, coverage, [], IntersectParams())
     assert (len(rooms), len(walls), len(corners)) == (0, 0, 0)
 
 
@@ -273,7 +273,7 @@ def test_the_two_faces_of_a_thin_wall_stay_two_and_are_one_wall(thickness, posed
     assert west.sum() == east.sum() == 1
     assert faces.normals[west] @ faces.normals[east].T == pytest.approx(-1, abs=1e-3)
     assert faces.normals[west, 0] < 0
-    rooms, walls, _ = intersect_walls(faces, coverage, IntersectParams())
+    rooms, walls, _ = intersect_walls(faces, coverage, [], IntersectParams())
     assert len(rooms) == 2
     between = np.flatnonzero((walls.rooms >= 0).all(axis=1))
     assert len(between) == 1

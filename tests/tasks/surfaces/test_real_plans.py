@@ -17,6 +17,7 @@ from tasks.surfaces.hough import HoughParams, detect_planes
 from tasks.surfaces.intersection import IntersectParams, intersect_walls
 from tasks.surfaces.label_params import LabelParams
 from tasks.surfaces.labelling import label_surfaces
+from tasks.surfaces.occupancy import OccupancyParams, occupied_space
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the shared data is not there")
@@ -33,7 +34,9 @@ def found_rooms(path, seed=0):
     points, snapshots, _ = read_scan(source, ReadParams())
     planes, labels = detect_planes(points, HoughParams(seed=seed))
     segments = extract_segments(points, snapshots, planes, labels, FilterParams())
-    rooms, _, _ = intersect_walls(*label_surfaces([segments], LabelParams()), IntersectParams())
+    space = [occupied_space(points, OccupancyParams())]
+    faces, coverage = label_surfaces([segments], LabelParams())
+    rooms, _, _ = intersect_walls(faces, coverage, space, IntersectParams())
     return list(rooms.polygons)
 
 
