@@ -1,6 +1,7 @@
 """All points labelled by the patches found among a few, and each plane fitted to its inliers."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numba as nb
 import numpy as np
@@ -10,6 +11,7 @@ from scipy import ndimage
 from storage.planes import PlaneLabels, Planes
 from storage.points import PointCloud
 from tasks.surfaces import patches
+from tasks.surfaces.candidates import find_candidates, make_atlas
 
 MIN_POINTS = 20
 """Points below which a patch is an accident."""
@@ -23,18 +25,17 @@ def label_all(
     labels: NDArray[np.int32],
     tolerance: float,
     cell: float,
-    tile: float,
 ) -> tuple[Planes, PlaneLabels]:
     """Label all points by the patches of the thinned ones, and fit each plane to its inliers."""
-    members = [few[i] for i in patches.members(labels)]
-    fits = [patches.fit_plane(xyz) for xyz in members]
-    normals, offsets = np.array([f[0] for f in fits]), np.array([f[1] for f in fits])
-    prints = [patches.footprint(xyz, n, cell) for xyz, n in zip(members, normals, strict=True)]
+    members = patches.members(labels)
+    fits = [patches.fit_plane(few, i) for i in members]
+    normals, offsets = np.array([f.normal for f in fits]), np.array([f.offset for f in fits])
+    prints = [patches.footprint(few, i, n, cell) for i, n in zip(members, normals, strict=True)]
     prints = [_dilated(p, 2) for p in prints]
     every = np.empty(len(points), np.int32)
     stride = max(1, len(points) // REFIT_POINTS)
     for xyz in (points.xyz[::stride], points.xyz):
-        hit, sums = _assign(xyz, prints, normals, offsets, tolerance, cell, tile, every)
+        hit, sums = _assign(xyz, prints, normals, offsets, tolerance, cell, every)
         fitted, at, rms = Moments(sums).planes()
         # a handful of a large cloud's sample says less than the thinned points did
         good = sums[:, 9] >= (3 if len(xyz) == len(points) else MIN_POINTS)
@@ -62,58 +63,22 @@ def _assign(
     offsets: NDArray[np.float64],
     tolerance: float,
     cell: float,
-    tile: float,
     labels: NDArray[np.int32],
 ) -> tuple[list[NDArray[np.bool_]], NDArray[np.float64]]:
-    low, tiles_y, tile_starts, tile_patches = _patches_of_tiles(
-        prints, normals, offsets, cell, tile
-    )
-    shapes = np.array([p.cells.shape for p in prints], np.int64)
-    starts = np.concatenate(([0], np.cumsum(shapes.prod(axis=1))))
-    flat = np.concatenate([p.cells.ravel() for p in prints]).view(np.uint8)
-    hit = np.zeros(len(flat), np.uint8)
+    atlas = make_atlas(prints, normals, offsets)
+    near = find_candidates(atlas, tolerance, cell)
+    hit = np.zeros(len(atlas.cells), bool)
     sums = np.zeros((len(prints), 10))
-    axes = np.array([(p.u, p.v) for p in prints])
-    lows = np.array([p.low for p in prints])
     _assign_points(
-        xyz, low, tile, tiles_y, tile_starts, tile_patches, normals, offsets, axes, lows, shapes,
-        starts[:-1], flat, hit, tolerance, cell, labels, sums,
+        xyz, near.low.astype(np.float32), np.float32(1 / near.edge), near.shape, near.starts,
+        near.patches, atlas.planes, atlas.axes, atlas.shapes, atlas.firsts, atlas.cells, hit,
+        tolerance, cell, labels, sums,
     )  # fmt: skip
     cut = [
-        hit[a:b].astype(bool).reshape(s)
-        for a, b, s in zip(starts, starts[1:], shapes, strict=False)
+        hit[a:b].reshape(p.cells.shape)
+        for (a, b), p in zip(pairwise(atlas.firsts), prints, strict=True)
     ]
     return cut, sums
-
-
-def _patches_of_tiles(
-    prints: list[patches.Footprint],
-    normals: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    cell: float,
-    tile: float,
-) -> tuple[NDArray[np.float64], int, NDArray[np.int64], NDArray[np.int64]]:
-    """Return the tiles' corner, their number along y, and the patches whose box meets each."""
-    boxes = []
-    for p, normal, offset in zip(prints, normals, offsets, strict=True):
-        a, b = np.nonzero(p.cells)
-        ab = [p.low + cell * np.array(corner) for corner in
-              ((a.min(), b.min()), (a.max() + 1, b.min()), (a.min(), b.max() + 1),
-               (a.max() + 1, b.max() + 1))]  # fmt: skip
-        corners = np.array([c[0] * p.u + c[1] * p.v + offset * normal for c in ab])[:, :2]
-        boxes.append((corners.min(axis=0) - cell, corners.max(axis=0) + cell))
-    lows, highs = np.array([b[0] for b in boxes]), np.array([b[1] for b in boxes])
-    low = lows.min(axis=0)
-    first = ((lows - low) / tile).astype(int)
-    last = ((highs - low) / tile).astype(int)
-    tiles = last.max(axis=0) + 1
-    lists: list[list[int]] = [[] for _ in range(int(tiles.prod()))]
-    for patch in range(len(prints)):
-        for x in range(first[patch, 0], last[patch, 0] + 1):
-            for y in range(first[patch, 1], last[patch, 1] + 1):
-                lists[x * tiles[1] + y].append(patch)
-    starts = np.concatenate(([0], np.cumsum([len(one) for one in lists]))).astype(np.int64)
-    return low, int(tiles[1]), starts, np.array([patch for one in lists for patch in one], np.int64)
 
 
 def _ordered(
@@ -137,7 +102,8 @@ def _ordered(
         rms=rms[order],
         origin=points.origin,
     )
-    return planes, PlaneLabels(rank[labels])
+    _renumber(labels, rank)
+    return planes, PlaneLabels(labels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,47 +128,55 @@ class Moments:
 
 @nb.njit(cache=True, nogil=True)
 def _assign_points(
-    xyz, low, tile, tiles_y, tile_starts, tile_patches, normals, offsets, axes, lows, shapes,
-    starts, cells, hit, tolerance, cell, labels, sums,
+    xyz, low, per_edge, voxels, starts, candidates, planes, axes, shapes, firsts, cells, hit,
+    tolerance, cell, labels, sums,
 ):  # fmt: skip
     """Label every point with the nearest plane whose footprint holds it, in one pass.
 
     Fills `labels` (n,), `hit` (the footprint cells that got a point) and `sums` (m, 10).
     """
-    tiles_x = (tile_starts.size - 1) // tiles_y
+    low_x, low_y, low_z = low
+    voxels_x, voxels_y, voxels_z = voxels
+    per_cell = 1 / cell
     for i in range(xyz.shape[0]):
-        x, y, z = np.float64(xyz[i, 0]), np.float64(xyz[i, 1]), np.float64(xyz[i, 2])
-        tx, ty = int((x - low[0]) / tile), int((y - low[1]) / tile)
         labels[i] = -1
-        if tx < 0 or ty < 0 or tx >= tiles_x or ty >= tiles_y:
+        fx = (xyz[i, 0] - low_x) * per_edge
+        fy = (xyz[i, 1] - low_y) * per_edge
+        fz = (xyz[i, 2] - low_z) * per_edge
+        if not (0 <= fx < voxels_x and 0 <= fy < voxels_y and 0 <= fz < voxels_z):
             continue
-        t = tx * tiles_y + ty
+        voxel = (np.int64(fx) * voxels_y + np.int64(fy)) * voxels_z + np.int64(fz)
+        x, y, z = np.float64(xyz[i, 0]), np.float64(xyz[i, 1]), np.float64(xyz[i, 2])
         best, chosen, where = tolerance, -1, 0
-        for q in range(tile_starts[t], tile_starts[t + 1]):
-            p = tile_patches[q]
-            away = abs(x * normals[p, 0] + y * normals[p, 1] + z * normals[p, 2] - offsets[p])
+        for q in range(starts[voxel], starts[voxel + 1]):
+            p = candidates[q]
+            away = abs(x * planes[p, 0] + y * planes[p, 1] + z * planes[p, 2] - planes[p, 3])
             if away >= best:
                 continue
-            u = x * axes[p, 0, 0] + y * axes[p, 0, 1] + z * axes[p, 0, 2] - lows[p, 0]
-            v = x * axes[p, 1, 0] + y * axes[p, 1, 1] + z * axes[p, 1, 2] - lows[p, 1]
-            a, b = int(u / cell), int(v / cell)
-            if u < 0 or v < 0 or a >= shapes[p, 0] or b >= shapes[p, 1]:
+            a = (x * axes[p, 0] + y * axes[p, 1] + z * axes[p, 2] - axes[p, 3]) * per_cell
+            b = (x * axes[p, 4] + y * axes[p, 5] + z * axes[p, 6] - axes[p, 7]) * per_cell
+            if not (0 <= a < shapes[p, 0] and 0 <= b < shapes[p, 1]):
                 continue
-            at = starts[p] + a * shapes[p, 1] + b
+            at = firsts[p] + np.int64(a) * shapes[p, 1] + np.int64(b)
             if cells[at]:
                 best, chosen, where = away, p, at
         if chosen < 0:
             continue
         labels[i] = chosen
-        hit[where] = 1
-        s = sums[chosen]
-        s[0] += x
-        s[1] += y
-        s[2] += z
-        s[3] += x * x
-        s[4] += y * y
-        s[5] += z * z
-        s[6] += x * y
-        s[7] += x * z
-        s[8] += y * z
-        s[9] += 1
+        hit[where] = True
+        sums[chosen, 0] += x
+        sums[chosen, 1] += y
+        sums[chosen, 2] += z
+        sums[chosen, 3] += x * x
+        sums[chosen, 4] += y * y
+        sums[chosen, 5] += z * z
+        sums[chosen, 6] += x * y
+        sums[chosen, 7] += x * z
+        sums[chosen, 8] += y * z
+        sums[chosen, 9] += 1
+
+
+@nb.njit(cache=True, nogil=True)
+def _renumber(labels, rank):
+    for i in range(labels.size):
+        labels[i] = rank[labels[i]]

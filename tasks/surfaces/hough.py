@@ -100,7 +100,7 @@ def detect_planes(points: PointCloud, params: HoughParams) -> tuple[Planes, Plan
     labels = patches.merge_coplanar(few, labels, tolerance, cell)
     if labels.max(initial=-1) < 0:
         return _nothing(points)
-    return label_all(points, few, labels, tolerance, cell, params.tile_m)
+    return label_all(points, few, labels, tolerance, cell)
 
 
 def _evenly(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.float32]:
@@ -146,76 +146,74 @@ def _search(
     """Return the members of each patch of one tile, in the order found."""
     if len(xyz) < MIN_POINTS:
         return []
-    centre = xyz.mean(axis=0)
     left = np.arange(len(xyz))
-    local = np.ascontiguousarray(xyz - centre)
-    enough = params.left_over * len(xyz)
+    here = xyz - xyz.mean(axis=0)
+    enough = max(params.left_over * len(xyz), MIN_POINTS)
     found: list[NDArray[np.int64]] = []
-    state = voting.seed_state(seed)
-    ballot = _Ballot(local, params)
-    for draw in (ballot.anywhere, ballot.nearby):
+    ballot = _Ballot(here, params, seed)
+    wide = (voting.ANYWHERE, params.beta_max, 0, params.tries)
+    near = (params.beta_near / 2, params.beta_near, params.draws_near, FEWEST_DRAWS)
+    for edge, reach, draws_each, draws in (wide, near):
+        ballot.fill(here, edge)
         missed = 0
-        while len(left) > max(enough, MIN_POINTS) and missed < params.misses:
-            here = local[left]
-            vote = draw(here, state)
+        while len(left) > enough and missed < params.misses:
+            vote = ballot.vote(here, reach, max(draws, draws_each * len(left)))
             if vote is None:
                 break
-            members = _patch(here, vote, tolerance, cell, params)
-            if members is None:
+            patch = _patch(here, *vote, tolerance, cell, params)
+            if patch is None:
                 missed += 1
                 continue
             missed = 0
-            found.append(left[members[0]])
-            left = left[~members[1]]
+            inliers, removed = patch
+            found.append(left[inliers])
+            keep = np.ones(len(left), bool)
+            keep[removed] = False
+            left, here = left[keep], here[keep]
+            ballot.fill(here, edge)
     return found
 
 
 def _patch(
     xyz: NDArray[np.float32],
-    vote: tuple[NDArray[np.float64], float],
+    normal: NDArray[np.float64],
+    offset: float,
     tolerance: float,
     cell: float,
     params: HoughParams,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
+) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Return (inliers, points to remove) of the patch a vote stands for, None if it is none.
 
     What is removed reaches half a tolerance further than the inliers, or the rim would be found
     again as a plane of its own.
     """
-    around = _within(xyz, *vote, 2 * tolerance)
-    if around.sum() < MIN_POINTS:
+    around = patches.near_plane(xyz, normal, offset, 2 * tolerance)
+    if len(around) < MIN_POINTS:
         return None
-    normal, offset = patches.fit_plane(xyz[around])
-    near = np.flatnonzero(_within(xyz, normal, offset, tolerance))
+    fit = patches.fit_plane(xyz, around)
+    near = patches.near_plane(xyz, fit.normal, fit.offset, tolerance)
     if len(near) < MIN_POINTS:
         return None
-    inside, area = patches.largest_cluster(xyz[near], normal, cell)
-    if area < params.min_area_m2 or inside.sum() < MIN_POINTS:
+    cluster, area = patches.largest_cluster(xyz, near, fit.normal, cell)
+    if area < params.min_area_m2 or len(cluster) < MIN_POINTS:
         return None
-    if patches.breadth(xyz[near[inside]]) < NARROWEST:
+    fit = patches.fit_plane(xyz, cluster)
+    if fit.breadth < NARROWEST:
         return None
-    normal, offset = patches.fit_plane(xyz[near[inside]])
-    wide = np.flatnonzero(_within(xyz, normal, offset, 1.5 * tolerance))
+    wide = patches.near_plane(xyz, fit.normal, fit.offset, 1.5 * tolerance)
     if len(wide) < MIN_POINTS:
         return None
-    cluster, _ = patches.largest_cluster(xyz[wide], normal, cell)
-    remove = np.zeros(len(xyz), bool)
-    remove[wide[cluster]] = True
-    keep = remove & _within(xyz, normal, offset, tolerance)
-    return (keep, remove) if keep.any() else None
-
-
-def _within(
-    xyz: NDArray[np.float32], normal: NDArray[np.float64], offset: float, distance: float
-) -> NDArray[np.bool_]:
-    return np.abs(xyz @ normal.astype(np.float32) - np.float32(offset)) < distance
+    remove, _ = patches.largest_cluster(xyz, wide, fit.normal, cell)
+    keep = patches.near_plane(xyz[remove], fit.normal, fit.offset, tolerance)
+    return (remove[keep], remove) if len(keep) else None
 
 
 class _Ballot:
-    """One tile's accumulator and its two ways to draw."""
+    """One tile's accumulator, and the bins its points are drawn from."""
 
-    def __init__(self, xyz: NDArray[np.float32], params: HoughParams) -> None:
+    def __init__(self, xyz: NDArray[np.float32], params: HoughParams, seed: int) -> None:
         self.params = params
+        self.state = voting.seed_state(seed)
         self.low = xyz.min(axis=0) - np.float32(1e-3)
         self.extent = xyz.max(axis=0) - self.low
         ball = voting.make_ball(params.cell_angle_rad)
@@ -224,55 +222,31 @@ class _Ballot:
         self.accumulator = np.zeros(int(ball.first_of_row[-1]) * rho_cells, np.uint16)
         self.log = (np.empty(voting.LOG, np.int64), np.empty((voting.LOG, 4), np.float32))
 
-    def anywhere(
-        self, xyz: NDArray[np.float32], state: NDArray[np.uint64]
-    ) -> tuple[NDArray[np.float64], float] | None:
-        """Draw from the whole tile with the wide range of distances."""
-        p = self.params
-        return _plane(
-            voting.vote_anywhere(
-                xyz,
-                p.beta_min,
-                p.beta_max,
-                self.accumulator,
-                *self.cells,
-                p.gamma_cell,
-                p.tries,
-                state,
-                *self.log,
-            )
+    def fill(self, xyz: NDArray[np.float32], edge: float) -> None:
+        """Sort points into bins of some edge, metres."""
+        shape = (self.extent / np.float32(edge)).astype(np.int64) + 1
+        self.bins = (
+            *voting.fill_bins(xyz, self.low, np.float32(edge), shape),
+            shape,
+            self.low,
+            np.float32(edge),
         )
 
-    def nearby(
-        self, xyz: NDArray[np.float32], state: NDArray[np.uint64]
+    def vote(
+        self, xyz: NDArray[np.float32], reach: float, draws: int
     ) -> tuple[NDArray[np.float64], float] | None:
-        """Draw around a point with the narrow range of distances."""
+        """Return the plane most voted for by points no further apart than a reach, metres."""
         p = self.params
-        edge = p.beta_near / 2
-        shape = (self.extent / edge).astype(np.int64) + 1
-        bins, members = voting.fill_bins(xyz, self.low, np.float32(edge), shape)
-        return _plane(
-            voting.vote_nearby(
-                xyz,
-                bins,
-                members,
-                shape,
-                self.low,
-                np.float32(edge),
-                p.beta_min,
-                p.beta_near,
-                self.accumulator,
-                *self.cells,
-                p.gamma_cell,
-                max(p.draws_near * len(xyz), FEWEST_DRAWS),
-                state,
-                *self.log,
-            )
+        found, *normal, offset = voting.vote(
+            xyz,
+            *self.bins,
+            p.beta_min,
+            reach,
+            self.accumulator,
+            *self.cells,
+            p.gamma_cell,
+            draws,
+            self.state,
+            *self.log,
         )
-
-
-def _plane(
-    vote: tuple[bool, float, float, float, float],
-) -> tuple[NDArray[np.float64], float] | None:
-    found, *normal, offset = vote
-    return (np.array(normal), offset) if found else None
+        return (np.array(normal), offset) if found else None

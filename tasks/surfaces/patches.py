@@ -2,18 +2,36 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from tasks.surfaces.thinning import bounds
+
 EIGHT = np.ones((3, 3), bool)
 """Neighbourhood in which two cells of a footprint touch."""
 COPLANAR_COS = np.cos(np.radians(8))
 """Patches tilted more than this are never one plane: the tilt error of a 0.3 m patch under
 2 cm of noise."""
+COPLANAR_SHARE = 0.8
+"""Share of the smaller patch's points that lie within tolerance of the larger one's plane, if they
+are one: the rest may be noise."""
+
+
+class Fit(NamedTuple):
+    """A least-squares plane."""
+
+    normal: NDArray[np.float64]
+    """(3,), unit length"""
+    offset: float
+    """metres"""
+    breadth: float
+    """across the points' longest direction, metres, as if they filled it evenly"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,61 +45,58 @@ class Footprint:
     cells: NDArray[np.bool_]
 
 
-def fit_plane(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], float]:
-    """Return the unit normal and offset of the least-squares plane through (n, 3) points."""
-    centre = xyz.mean(axis=0, dtype=np.float64)
-    local = xyz - centre
-    normal = np.linalg.eigh(local.T @ local)[1][:, 0]
-    return normal, float(normal @ centre)
+def fit_plane(xyz: NDArray[np.float32], members: NDArray[np.int64]) -> Fit:
+    """Return the least-squares plane through some of (n, 3) points."""
+    centre, scatter = _moments(xyz, members)
+    values, vectors = np.linalg.eigh(scatter)
+    breadth = float(np.sqrt(12 * max(values[1], 0.0)))
+    return Fit(vectors[:, 0], float(vectors[:, 0] @ centre), breadth)
 
 
-def breadth(xyz: NDArray[np.float32]) -> float:
-    """Return how broad a patch is across its longest direction, metres, as if evenly filled."""
-    local = xyz - xyz.mean(axis=0, dtype=np.float64)
-    across = np.linalg.eigvalsh(local.T @ local)[1] / len(xyz)
-    return float(np.sqrt(12 * max(across, 0.0)))
+def near_plane(
+    xyz: NDArray[np.float32], normal: NDArray[np.float64], offset: float, distance: float
+) -> NDArray[np.int64]:
+    """Return the indices of the points closer to a plane than a distance."""
+    nx, ny, nz = normal.astype(np.float32)
+    return _near_plane(xyz, nx, ny, nz, np.float32(offset), np.float32(distance))
 
 
 def plane_axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return two unit vectors spanning the plane with this unit normal; the first is level."""
-    level = np.cross([0.0, 0.0, 1.0], normal)
-    if np.linalg.norm(level) < 0.1:  # a floor: any level direction will do
-        level = np.cross(normal, [1.0, 0.0, 0.0])
-    u = level / np.linalg.norm(level)
-    return u, np.cross(normal, u)
+    x, y, z = normal.tolist()
+    # a floor: any level direction will do
+    level = np.array((-y, x, 0.0) if np.hypot(x, y) > 0.1 else (0.0, z, -y))
+    u = level / np.sqrt(level @ level)
+    a, b, c = u.tolist()
+    return u, np.array((y * c - z * b, z * a - x * c, x * b - y * a))
 
 
-def footprint(xyz: NDArray[np.float32], normal: NDArray[np.float64], cell: float) -> Footprint:
-    """Return the cells of the plane that hold a point, with a margin of three empty cells."""
+def footprint(
+    xyz: NDArray[np.float32], members: NDArray[np.int64], normal: NDArray[np.float64], cell: float
+) -> Footprint:
+    """Return the cells of the plane that hold a member, with a margin of three empty cells."""
     u, v = plane_axes(normal)
-    ab = np.stack((xyz @ u, xyz @ v), axis=1)
-    low = ab.min(axis=0) - 3 * cell
-    at = ((ab - low) / cell).astype(np.int64)
-    cells = np.zeros(at.max(axis=0) + 4, bool)
-    cells[at[:, 0], at[:, 1]] = True
-    return Footprint(u, v, low, cells)
+    at, low, shape = _cells_of(xyz, members, u, v, cell)
+    return Footprint(u, v, low - 3 * cell, np.pad(_filled(at, shape), 3))
 
 
 def largest_cluster(
-    xyz: NDArray[np.float32], normal: NDArray[np.float64], cell: float
-) -> tuple[NDArray[np.bool_], float]:
-    """Return which points lie in the largest connected part of a footprint, and its area in m2."""
-    at = _cells_of(xyz, normal, cell)
-    grid = np.zeros(at.max(axis=0) + 1, bool)
-    grid[at[:, 0], at[:, 1]] = True
-    labels, count = ndimage.label(grid, EIGHT)
-    sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    xyz: NDArray[np.float32], members: NDArray[np.int64], normal: NDArray[np.float64], cell: float
+) -> tuple[NDArray[np.int64], float]:
+    """Return the members in the largest connected part of their footprint, and its area in m2."""
+    at, _, shape = _cells_of(xyz, members, *plane_axes(normal), cell)
+    labels, count = ndimage.label(_filled(at, shape), EIGHT)
+    labels = labels.ravel()
+    sizes = np.bincount(labels, minlength=count + 1)
     sizes[0] = 0
     best = int(sizes.argmax())
-    return labels[at[:, 0], at[:, 1]] == best, float(sizes[best]) * cell**2
+    return members[labels[at] == best], float(sizes[best]) * cell**2
 
 
-def _cells_of(
-    xyz: NDArray[np.float32], normal: NDArray[np.float64], cell: float
-) -> NDArray[np.int64]:
-    u, v = plane_axes(normal)
-    ab = np.stack((xyz @ u.astype(np.float32), xyz @ v.astype(np.float32)), axis=1)
-    return ((ab - ab.min(axis=0)) / np.float32(cell)).astype(np.int64)
+def _filled(at: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    grid = np.zeros(shape, bool)
+    grid.reshape(-1)[at] = True
+    return grid
 
 
 def merge_coplanar(
@@ -109,18 +124,17 @@ def merge_coplanar(
     m = len(patch)
     if m == 0:
         return labels
-    fits = [fit_plane(xyz[i]) for i in patch]
-    normals = np.array([f[0] for f in fits])
-    offsets = np.array([f[1] for f in fits])
-    lows = np.array([xyz[i].min(axis=0) for i in patch]) - cell
-    highs = np.array([xyz[i].max(axis=0) for i in patch]) + cell
+    fits = [fit_plane(xyz, i) for i in patch]
+    normals = np.array([f.normal for f in fits])
+    boxes = np.array([bounds(xyz[i]) for i in patch])
+    lows, highs = boxes[:, 0] - cell, boxes[:, 1] + cell
     near = (lows[:, None] <= highs[None]).all(axis=2)
     candidates = near & near.T & (np.abs(normals @ normals.T) > COPLANAR_COS)
     first, second = np.nonzero(np.triu(candidates, 1))
     joined = [
         (i, j)
         for i, j in zip(first.tolist(), second.tolist(), strict=True)
-        if _one_plane(xyz, patch[i], patch[j], normals, offsets, i, j, tolerance)
+        if _one_plane(xyz, patch[i], patch[j], fits[i], fits[j], tolerance)
         and _touch(xyz, patch[i], patch[j], normals[i], cell)
     ]
     return _relabel(labels, _groups(m, joined))
@@ -130,16 +144,14 @@ def _one_plane(
     xyz: NDArray[np.float32],
     a: NDArray[np.int64],
     b: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    i: int,
-    j: int,
+    fit_a: Fit,
+    fit_b: Fit,
     tolerance: float,
 ) -> bool:
     """Whether the smaller patch lies within tolerance of the larger one's plane."""
-    plane, patch = (i, b) if len(a) >= len(b) else (j, a)
-    away = np.abs(xyz[patch] @ normals[plane] - offsets[plane])
-    return bool(np.percentile(away, 80) < tolerance)
+    plane, patch = (fit_a, b) if len(a) >= len(b) else (fit_b, a)
+    near = near_plane(xyz[patch], plane.normal, plane.offset, tolerance)
+    return len(near) >= COPLANAR_SHARE * len(patch)
 
 
 def _touch(
@@ -149,17 +161,14 @@ def _touch(
     normal: NDArray[np.float64],
     cell: float,
 ) -> bool:
-    at = _cells_of(xyz[np.concatenate((a, b))], normal, cell)
-    grid = np.zeros(at.max(axis=0) + 1, bool)
-    grid[at[: len(a), 0], at[: len(a), 1]] = True
-    grid = ndimage.binary_dilation(grid, EIGHT)
-    return bool(grid[at[len(a) :, 0], at[len(a) :, 1]].any())
+    at, _, shape = _cells_of(xyz, np.concatenate((a, b)), *plane_axes(normal), cell)
+    grid = ndimage.binary_dilation(_filled(at[: len(a)], shape), EIGHT)
+    return bool(grid.reshape(-1)[at[len(a) :]].any())
 
 
 def members(labels: NDArray[np.int32]) -> list[NDArray[np.int64]]:
     """Return the indices of the points of each label from 0 on."""
-    order = np.argsort(labels, kind="stable")
-    starts = np.searchsorted(labels[order], np.arange(labels.max(initial=-1) + 2))
+    order, starts = _by_label(labels, int(labels.max(initial=-1)) + 1)
     return [order[a:b] for a, b in pairwise(starts)]
 
 
@@ -175,3 +184,92 @@ def _relabel(labels: NDArray[np.int32], groups: NDArray[np.int64]) -> NDArray[np
     rank = np.empty(len(sizes), np.int32)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
     return np.where(grouped >= 0, rank[grouped], -1).astype(np.int32)
+
+
+@nb.njit(cache=True, nogil=True)
+def _moments(
+    xyz: NDArray[np.float32], members: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean (3,) and the covariance (3, 3) of some points."""
+    n = members.size
+    mx = my = mz = 0.0
+    for i in members:
+        mx += xyz[i, 0]
+        my += xyz[i, 1]
+        mz += xyz[i, 2]
+    mx, my, mz = mx / n, my / n, mz / n
+    xx = yy = zz = xy = xz = yz = 0.0
+    for i in members:
+        x, y, z = xyz[i, 0] - mx, xyz[i, 1] - my, xyz[i, 2] - mz
+        xx += x * x
+        yy += y * y
+        zz += z * z
+        xy += x * y
+        xz += x * z
+        yz += y * z
+    return np.array([mx, my, mz]), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / n
+
+
+@nb.njit(cache=True, nogil=True)
+def _near_plane(
+    xyz: NDArray[np.float32],
+    nx: np.float32,
+    ny: np.float32,
+    nz: np.float32,
+    offset: np.float32,
+    distance: np.float32,
+) -> NDArray[np.int64]:
+    near = np.empty(xyz.shape[0], np.int64)
+    count = 0
+    for i in range(xyz.shape[0]):
+        away = xyz[i, 0] * nx + xyz[i, 1] * ny + xyz[i, 2] * nz - offset
+        near[count] = i
+        count += abs(away) < distance
+    return near[:count].copy()
+
+
+@nb.njit(cache=True, nogil=True)
+def _cells_of(
+    xyz: NDArray[np.float32],
+    members: NDArray[np.int64],
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    cell: float,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, int]]:
+    """Return the cell of each member in a plane's grid, its lowest corner (2,) and its shape."""
+    n = members.size
+    ab = np.empty((n, 2))
+    low_a = low_b = np.inf
+    high_a = high_b = -np.inf
+    for q in range(n):
+        i = members[q]
+        a = xyz[i, 0] * u[0] + xyz[i, 1] * u[1] + xyz[i, 2] * u[2]
+        b = xyz[i, 0] * v[0] + xyz[i, 1] * v[1] + xyz[i, 2] * v[2]
+        ab[q, 0], ab[q, 1] = a, b
+        low_a, low_b = min(low_a, a), min(low_b, b)
+        high_a, high_b = max(high_a, a), max(high_b, b)
+    shape = (int((high_a - low_a) / cell) + 1, int((high_b - low_b) / cell) + 1)
+    at = np.empty(n, np.int64)
+    for q in range(n):
+        at[q] = int((ab[q, 0] - low_a) / cell) * shape[1] + int((ab[q, 1] - low_b) / cell)
+    return at, np.array([low_a, low_b]), shape
+
+
+@nb.njit(cache=True, nogil=True)
+def _by_label(
+    labels: NDArray[np.int32], n_labels: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the points' order by label, ascending in each, and where each label begins."""
+    starts = np.zeros(n_labels + 1, np.int64)
+    for label in labels:
+        if label >= 0:
+            starts[label + 1] += 1
+    for label in range(n_labels):
+        starts[label + 1] += starts[label]
+    order = np.empty(starts[n_labels], np.int64)
+    at = starts[:-1].copy()
+    for i in range(labels.size):
+        if labels[i] >= 0:
+            order[at[labels[i]]] = i
+            at[labels[i]] += 1
+    return order, starts

@@ -100,15 +100,18 @@ def thin(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
 
 @nb.njit(cache=True, nogil=True)
 def _bounds(xyz):
-    low, high = xyz[0].copy(), xyz[0].copy()
+    lx, ly, lz = xyz[0, 0], xyz[0, 1], xyz[0, 2]
+    hx, hy, hz = lx, ly, lz
     for i in range(1, xyz.shape[0]):
-        for axis in range(3):
-            value = xyz[i, axis]
-            if value < low[axis]:
-                low[axis] = value
-            elif value > high[axis]:
-                high[axis] = value
-    return low, high
+        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        # no branches: what is extreme in a shuffled cloud cannot be foretold
+        lx = x if x < lx else lx
+        ly = y if y < ly else ly
+        lz = z if z < lz else lz
+        hx = x if x > hx else hx
+        hy = y if y > hy else hy
+        hz = z if z > hz else hz
+    return np.array([lx, ly, lz]), np.array([hx, hy, hz])
 
 
 @nb.njit(inline="always")
@@ -132,33 +135,28 @@ def _company(counts, x, y, z):
 
 @nb.njit(cache=True, nogil=True)
 def _one_of_each(xyz, low, inverse, shape, counts):
+    first = np.empty(min(xyz.shape[0], counts.size), np.int64)  # touched as far as it is filled
     occupied = 0
     for i in range(xyz.shape[0]):
         x, y, z = _voxel_of(xyz, i, low, inverse, shape)
-        if counts[x, y, z] == 0:
-            occupied += 1
-        if counts[x, y, z] < FULL:
-            counts[x, y, z] += 1
+        count = counts[x, y, z]
+        first[occupied] = i
+        occupied += count == 0
+        counts[x, y, z] = count + (count < FULL)
     dense = xyz.shape[0] > DENSE * occupied
-    kept = np.empty(occupied, np.int64)
-    taken = np.zeros((counts.size + 7) // 8, np.uint8)
-    count = 0
-    for i in range(xyz.shape[0]):
+    kept = 0
+    for q in range(occupied):
+        i = first[q]
         x, y, z = _voxel_of(xyz, i, low, inverse, shape)
-        cell = (x * counts.shape[1] + y) * counts.shape[2] + z
-        bit = np.uint8(1 << (cell & 7))
-        if taken[cell >> 3] & bit:
-            continue
-        taken[cell >> 3] |= bit
         most = max(
             counts[x - 1, y, z], counts[x + 1, y, z], counts[x, y - 1, z],
             counts[x, y + 1, z], counts[x, y, z - 1], counts[x, y, z + 1],
         )  # fmt: skip
         if TAIL * counts[x, y, z] < most or (dense and _company(counts, x, y, z) < COMPANY):
             continue
-        kept[count] = i
-        count += 1
-    return kept[:count].copy()
+        first[kept] = i
+        kept += 1
+    return first[:kept].copy()
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,12 @@
 """Plane detection: all surfaces of closed-form rooms, whatever the density, seed or place."""
 
+import hashlib
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -138,12 +145,33 @@ def test_a_thinly_seen_wall_beside_a_densely_seen_floor_is_kept():
     assert (labels.labels[-900:] == 1).mean() > 0.9
 
 
-def test_the_same_seed_gives_the_same_bytes():
-    xyz, _ = furnished_room(100_000, seed=5)
-    first, second = (detect_planes(cloud(xyz), HoughParams(seed=3)) for _ in range(2))
-    for name in ("normals", "offsets", "inliers", "rms", "origin"):
-        assert getattr(first[0], name).tobytes() == getattr(second[0], name).tobytes(), name
-    assert first[1].labels.tobytes() == second[1].labels.tobytes()
+def digest_of_a_room(seed):
+    """Return a digest of all that is detected in a room."""
+    planes, labels = detect_planes(cloud(furnished_room(300_000, 5)[0]), HoughParams(seed=seed))
+    arrays = planes.normals, planes.offsets, planes.inliers, planes.rms, planes.origin
+    parts = [a.tobytes() for a in (*arrays, labels.labels)]
+    return hashlib.sha256(b"".join(parts)).hexdigest()
+
+
+def test_the_same_seed_gives_the_same_bytes_in_threads_side_by_side():
+    alone = [digest_of_a_room(seed) for seed in (3, 4)]
+    assert alone[0] != alone[1]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(digest_of_a_room, (3, 4, 3, 4)))
+    assert together == alone * 2
+
+
+@pytest.mark.parametrize("threads", ["1", "4"])
+def test_the_bytes_do_not_depend_on_how_many_threads_libraries_may_use(threads):
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    here = Path(__file__)
+    program = f"from {here.stem} import digest_of_a_room; print(digest_of_a_room(3))"
+    path = os.pathsep.join([str(here.parents[3]), str(here.parent)])
+    env = os.environ | dict.fromkeys(names, threads) | {"PYTHONPATH": path}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=env, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == digest_of_a_room(3)
 
 
 @pytest.mark.parametrize("seed", range(4))
