@@ -1,0 +1,23 @@
+-- the quality gate over T_q: scans accepted, and how good a judge of what is usable it is
+with thresholds as (select unnest(range(0, 21)) / 20.0 as t_q),
+judged as (
+  select q.building, q.storey, q.p_sum, w.usable
+  from quality q
+  left join scan_work w
+    on w.building = q.building and w.storey = q.storey and w.scan = q.scan
+  where q.p_sum is not null
+)
+select building, storey, t_q,
+       count(*) as assessed,
+       count(*) filter (p_sum <= t_q) as accepted,
+       round(100.0 * count(*) filter (p_sum <= t_q) / count(*), 1) as accepted_percent,
+       -- null where none was rejected, or nobody said what was usable
+       round(100.0 * count(*) filter (p_sum > t_q and not usable)
+         / nullif(count(usable) filter (p_sum > t_q), 0), 1) as unusable_of_rejected_percent,
+       round(100.0 * count(*) filter (p_sum <= t_q and not usable)
+         / nullif(count(usable) filter (p_sum <= t_q), 0), 1) as unusable_of_accepted_percent,
+       round(100.0 * count(*) filter (p_sum > t_q and not usable)
+         / nullif(count(*) filter (not usable), 0), 1) as unusable_caught_percent
+from thresholds, judged
+group by building, storey, t_q
+order by building, storey, t_q
