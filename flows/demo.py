@@ -7,10 +7,14 @@ from pathlib import Path
 from storage.plan import Plan
 from storage.plan_geojson import write_plan
 from tasks.scans.bundle import write_bundle
+from tasks.simulation.campaign import CampaignParams, simulate_scans
 from tasks.simulation.plan import StoreyParams, make_storey
-from tasks.simulation.scans import CampaignParams, simulate_scans
+from tasks.simulation.sensor import SensorParams
+from tasks.simulation.volunteers import VolunteerParams
 
 BUILDING, STOREY = "demo", "0"
+AGAIN = 3
+"""Rooms of the demo that a second volunteer scans too."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +39,23 @@ def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> tuple[Plan
     truth = make_storey(StoreyParams(seed=seed), BUILDING, STOREY)
     write_plan(truth, folder / "truth.geojson")
     scans = []
-    for name, cloud, snapshots in simulate_scans(truth, CampaignParams(seed=seed)):
-        scans.append(folder / "scans" / f"{name}.scan")
-        write_bundle(scans[-1], cloud, snapshots)
-        told(f"simulated scan {name}: {len(cloud):,} points")
+    for scan in simulate_scans(truth, _small_campaign(seed, len(truth.rooms) + AGAIN)):
+        scans.append(folder / "scans" / f"{scan.name}.scan")
+        write_bundle(scans[-1], scan.cloud, scan.snapshots, frame="device")
+        told(f"simulated scan {scan.name}: {len(scan.cloud):,} points")
     return truth, tuple(scans)
+
+
+def _small_campaign(seed: int, scans: int) -> CampaignParams:
+    """Return scans by skilled volunteers, of fewer and sparser snapshots than Tango's."""
+    return CampaignParams(
+        seed=seed,
+        scans=scans,
+        skill=0.9,
+        skill_spread=0.1,
+        sensor=SensorParams(rays=12_000),
+        volunteer=VolunteerParams(interval_s=1.0),
+    )
 
 
 def compare_rooms(truth: Plan, mapped: Plan) -> list[RoomMatch]:

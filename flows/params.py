@@ -4,9 +4,16 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ValidationError, model_validator
 
 from storage.errors import MapSenseError
+from tasks.device.codec import CodecParams
+from tasks.device.costs import EnergyParams
+from tasks.device.quality import QualityParams
+from tasks.device.sweep import SweepParams
+from tasks.device.targets import TargetParams
+from tasks.device.voxels import VoxelParams
+from tasks.device.work import WorkParams
 from tasks.params import Params
 from tasks.scans.read import ReadParams
 from tasks.surfaces.filtering import FilterParams
@@ -21,6 +28,12 @@ class MapSenseParams(Params):
 
     scans: ReadParams = ReadParams()
     """How scans are read."""
+    quality: QualityParams = QualityParams()
+    """The quality gate (Eq. 1-4)."""
+    voxels: VoxelParams = VoxelParams()
+    """The voxel grid (Sec. 3.3)."""
+    codec: CodecParams = CodecParams()
+    """Octree compression (Sec. 3.3)."""
     hough: HoughParams = HoughParams()
     """Plane detection (Sec. 4.1)."""
     filter: FilterParams = FilterParams()
@@ -31,6 +44,20 @@ class MapSenseParams(Params):
     """Plane labelling (Eq. 6, 7)."""
     intersect: IntersectParams = IntersectParams()
     """Plane intersection (Eq. 8)."""
+    work: WorkParams = WorkParams()
+    """When the server can use a scan."""
+    energy: EnergyParams = EnergyParams()
+    """The energy model (Sec. 7.3.2)."""
+    sweep: SweepParams = SweepParams()
+    """Its sensitivity."""
+    targets: TargetParams = TargetParams()
+    """The savings wanted."""
+
+    @model_validator(mode="after")
+    def _asks_for_one_quality(self) -> "MapSenseParams":
+        if self.energy.t_q != self.quality.t_q:
+            raise ValueError("quality.t_q and energy.t_q differ: set both to what is asked for")
+        return self
 
 
 def parse_params(given: Mapping[str, Any]) -> MapSenseParams:

@@ -11,6 +11,7 @@ from storage import coverage as stored_coverage
 from storage.files import write_whole
 from storage.plan import Plan
 from storage.plan_geojson import write_plan
+from storage.quality import Quality
 from storage.runs import COMPLETED, FAILED, PARTIAL
 from storage.scans import Scan
 from storage.stages import StageRow, of_run
@@ -33,6 +34,10 @@ class Mapped:
     plan: Plan
     coverage: stored_coverage.Coverage
     scans: tuple[Scan, ...]
+    quality: tuple[Quality, ...]
+    """of each scan"""
+    rejected: tuple[Skipped, ...]
+    """scans the quality gate kept on their devices"""
     rows: dict[str, int]
     """rows of each table, over all scans"""
 
@@ -64,10 +69,15 @@ def summarise(
         "simulated": request.simulated,
         "run": request.run,
         "used": {
-            "scans": [_scan(scan) for scan in mapped.scans] if mapped else [],
+            "scans": [_scan(*s) for s in zip(mapped.scans, mapped.quality, strict=True)]
+            if mapped
+            else [],
             "points": sum(scan.points_kept for scan in mapped.scans) if mapped else 0,
             "params": request.params.model_dump(mode="json"),
         },
+        "rejected": [{"scan": s.scan, "reason": s.reason} for s in mapped.rejected]
+        if mapped
+        else [],
         "skipped": [{"scan": s.scan, "reason": s.reason} for s in skipped],
         "found": _found(mapped) if mapped else None,
         "seconds": round((datetime.now(UTC) - started_at).total_seconds(), 3),
@@ -103,13 +113,16 @@ def stage_costs(rows: list[StageRow]) -> dict[str, dict[str, float | int]]:
     return dict(costs)
 
 
-def _scan(scan: Scan) -> dict[str, Any]:
+def _scan(scan: Scan, quality: Quality) -> dict[str, Any]:
     return {
         "scan": scan.name,
         "format": scan.format,
         "points": scan.points_kept,
         "points_read": scan.points_read,
         "snapshots": scan.snapshots,
+        "p_in": quality.p_in,
+        "p_sk": quality.p_sk,
+        "p_sum": quality.p_sum,
         "up": scan.up,
         "scale": scan.scale,
         "notes": scan.notes,

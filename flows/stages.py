@@ -1,5 +1,14 @@
 """The stages of the pipeline: pure functions made cached, timed tasks, one line each."""
 
+from tasks.device.codec import decode, encode
+from tasks.device.energy import savings as average_savings
+from tasks.device.energy import simulate_energy
+from tasks.device.quality import assess
+from tasks.device.sweep import sweep
+from tasks.device.targets import solve_targets
+from tasks.device.voxels import voxel_grid
+from tasks.device.work import tally_work
+from tasks.evaluation.rooms import room_errors as compare_rooms
 from tasks.scans.read import read_scan
 from tasks.stage.declare import stage
 from tasks.surfaces.filtering import extract_segments
@@ -9,11 +18,22 @@ from tasks.surfaces.labelling import label_surfaces
 from tasks.surfaces.occupancy import occupied_space
 
 clouds = stage(read_scan, name="clouds")
+quality = stage(assess, name="quality")
+voxels = stage(voxel_grid, name="voxels")
+streams = stage(encode, name="streams")
+decoded = stage(decode, name="decoded")
 planes = stage(detect_planes, name="planes")
 segments = stage(extract_segments, name="segments")
 occupancy = stage(occupied_space, name="occupancy")
 faces = stage(label_surfaces, name="faces")
 rooms = stage(intersect_walls, name="rooms")
 
-PER_SCAN = (clouds, planes, segments, occupancy)
-PER_STOREY = (faces, rooms)
+room_errors = stage(compare_rooms, name="room_errors")
+scan_work = stage(tally_work, name="scan_work")
+energy = stage(simulate_energy, name="energy")
+savings = stage(average_savings, name="savings")
+energy_sweep = stage(sweep, name="energy_sweep")
+energy_targets = stage(solve_targets, name="energy_targets")
+
+PER_SCAN = len((clouds, quality, voxels, streams, decoded, planes, segments, occupancy))
+PER_STOREY = len((faces, rooms))

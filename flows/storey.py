@@ -25,6 +25,7 @@ from flows.settings import default_jobs
 from storage.artifacts import Ref, read
 from storage.coverage import COVERAGE
 from storage.errors import StoreError
+from storage.quality import QUALITY
 from storage.rooms import ROOMS
 from storage.runs import FAILED, Run, recorded
 from storage.scans import SCANS
@@ -84,31 +85,52 @@ def _run(request: StoreyRequest, started_at: datetime) -> dict[str, Any]:
 def _map(request: StoreyRequest, sources: list[Source], skipped: list[Skipped]) -> Mapped | None:
     """Map the storey from the scans that can be used; None if there is none."""
     place, params = request.place(), request.params
-    scans = {source.name: place.of_scan(source.name) for source in sources}
-    progress.expect(place, len(stages.PER_SCAN) * len(scans) + len(stages.PER_STOREY))
+    at = {source.name: place.of_scan(source.name) for source in sources}
+    progress.expect(place, stages.PER_SCAN * len(at) + stages.PER_STOREY)
 
     # one stage after the other over all scans: a worker that takes a task finds its inputs made
-    clouds = {s.name: stages.clouds.submit(scans[s.name], s, params.scans) for s in sources}
-    planes = {n: stages.planes.submit(scans[n], clouds[n], params.hough) for n in scans}
-    segments = {
-        n: stages.segments.submit(
-            scans[n], clouds[n], clouds[n], planes[n], planes[n], params.filter
-        )
-        for n in scans
-    }
-    occupancy = {n: stages.occupancy.submit(scans[n], clouds[n], params.occupancy) for n in scans}
-    made_of = {n: (clouds[n], planes[n], segments[n], occupancy[n]) for n in scans}
-    used = [n for n in scans if _is_used(n, made_of[n], skipped)]
-    if not used:
-        return None
+    # on the device: registered snapshots, the quality gate, voxels, the octree stream (Sec. 3)
+    clouds = {s.name: stages.clouds.submit(at[s.name], s, params.scans) for s in sources}
+    quality = {n: stages.quality.submit(at[n], clouds[n], params.quality) for n in at}
+    rated = {n: clouds[n] for n in at if _is_used(n, (clouds[n], quality[n]), skipped)}
+    rejected = _rejected(request, {n: quality[n].result() for n in rated})
+    sent = {n: cloud for n, cloud in rated.items() if n not in rejected}
+    voxels = {n: stages.voxels.submit(at[n], sent[n], params.voxels) for n in sent}
+    streams = {n: stages.streams.submit(at[n], voxels[n], params.codec) for n in sent}
 
+    # on the server: what was decoded becomes planes, segments, and the initial model (Sec. 4.1)
+    points = {n: stages.decoded.submit(at[n], streams[n]) for n in sent}
+    planes = {n: stages.planes.submit(at[n], points[n], params.hough) for n in sent}
+    segments = {
+        n: stages.segments.submit(at[n], points[n], sent[n], planes[n], planes[n], params.filter)
+        for n in sent
+    }
+    occupancy = {n: stages.occupancy.submit(at[n], points[n], params.occupancy) for n in sent}
+    each = (voxels, streams, points, planes, segments, occupancy)
+    used = [n for n in sent if _is_used(n, [future[n] for future in each], skipped)]
+    if not used:
+        skipped += [Skipped(n, why) for n, why in rejected.items()]
+        return None
     faces = stages.faces(place, [segments[n].result() for n in used], params.label)
     space = [occupancy[n].result() for n in used]
     rooms = stages.rooms(place, faces, faces, space, params.intersect)
+
     made: list[Ref] = [*faces, *rooms, *space]
     for n in used:
-        made += [*clouds[n].result(), *planes[n].result(), segments[n].result()]
-    return _mapped(request, used, made, _notes(request, used, skipped))
+        made += [*sent[n].result(), quality[n].result(), streams[n].result()]
+        made += [*planes[n].result(), segments[n].result()]
+    return _mapped(request, used, made, _notes(request, used, skipped, rejected), rejected)
+
+
+def _rejected(request: StoreyRequest, rated: dict[str, Ref]) -> dict[str, str]:
+    """Return the scans the quality gate keeps on their devices (Eq. 4), and why."""
+    qualities = {n: read(QUALITY, ref, request.store) for n, ref in rated.items()}
+    return {
+        n: f"rejected on the device: P_sum {q.p_sum:.2f} > T_q {q.t_q:.2f}, {q.reason} "
+        f"(quality.t_q sets what is asked for)"
+        for n, q in qualities.items()
+        if q.accepted is False
+    }
 
 
 def _is_used(name: str, futures: Iterable[PrefectFuture[Any]], skipped: list[Skipped]) -> bool:
@@ -123,7 +145,13 @@ def _is_used(name: str, futures: Iterable[PrefectFuture[Any]], skipped: list[Ski
     return True
 
 
-def _mapped(request: StoreyRequest, used: list[str], made: list[Ref], notes: list[str]) -> Mapped:
+def _mapped(
+    request: StoreyRequest,
+    used: list[str],
+    made: list[Ref],
+    notes: list[str],
+    rejected: dict[str, str],
+) -> Mapped:
     refs: dict[str, list[Ref]] = {}
     for ref in made:
         refs.setdefault(ref.table, []).append(ref)
@@ -141,14 +169,19 @@ def _mapped(request: StoreyRequest, used: list[str], made: list[Ref], notes: lis
         plan,
         read(COVERAGE, refs["coverage"][0], store),
         tuple(read(SCANS, ref, store) for ref in refs["scans"]),
+        tuple(read(QUALITY, ref, store) for ref in refs["quality"]),
+        tuple(Skipped(scan, why) for scan, why in rejected.items()),
         {table: sum(ref.rows for ref in of_table) for table, of_table in refs.items()},
     )
 
 
-def _notes(request: StoreyRequest, used: list[str], skipped: list[Skipped]) -> list[str]:
+def _notes(
+    request: StoreyRequest, used: list[str], skipped: list[Skipped], rejected: dict[str, str]
+) -> list[str]:
     notes = ["made from simulated scans"] if request.simulated else []
-    if skipped:
-        notes.append(f"made from {len(used)} of {len(used) + len(skipped)} scans")
+    if skipped or rejected:
+        asked = len(used) + len(skipped) + len(rejected)
+        notes.append(f"made from {len(used)} of {asked} scans")
     return notes
 
 
@@ -159,6 +192,8 @@ def _message(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
         return f"none of {asked} scans could be used: {reasons}"
     if skipped:
         return f"{len(skipped)} of {asked} scans skipped: {reasons}"
+    if mapped.rejected:
+        return f"{len(mapped.rejected)} of {asked} scans rejected by the quality gate"
     return "" if mapped.plan.rooms else "no room was found: see the drawing for what was seen"
 
 

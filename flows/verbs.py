@@ -87,6 +87,93 @@ def run_demo(out: Path, store: Path | None, seed: int, jobs: int | None, as_json
     return 0 if is_done(summary) else 1
 
 
+def simulate_campaign(
+    plans: Sequence[Path],
+    preset: str | None,
+    storey: str | None,
+    building: str,
+    scans: int | None,
+    seed: int,
+    out: Path,
+    assignments: list[str],
+    as_json: bool,
+) -> int:
+    """Simulate the scans of storeys into a folder."""
+    from pydantic import ValidationError
+
+    from flows import campaign
+    from flows.params import explain
+
+    if bool(plans) == bool(preset):
+        raise MapSenseError("name a plan (GeoJSON or IFC) to scan, or a --preset, and not both")
+    _check_name(building)
+    given = _merged({"campaign": {"seed": seed}}, _assigned(assignments))
+    try:
+        params = campaign.SimulationParams.model_validate(given)
+    except ValidationError as error:
+        raise MapSenseError(explain(error, campaign.SimulationParams)) from error
+    out = writable(out, "folder of the campaign", "--out")
+    if preset is not None:
+        sites = campaign.preset_sites(preset, building)
+        if preset == "paper" and scans is None:
+            scans = campaign.PAPER_SCANS
+    else:
+        sites = [site for path in plans for site in campaign.plan_sites(path, storey, params)]
+    made = campaign.simulate(
+        sites, out, building, scans, params.campaign, lambda line: _tell(line, not as_json)
+    )
+    if as_json:
+        print(made.model_dump_json(indent=1))
+        return 0
+    all_scans = [scan for each in made.storeys for scan in each.scans]
+    points = sum(scan.points for scan in all_scans)
+    print(
+        f"{building}: {_count(len(all_scans), 'simulated scan')} of "
+        f"{_count(len(made.storeys), 'storey')}, {points:,} points "
+        f"({points * 12 / 1e9:.2f} GB as raw floats)"
+    )
+    for each in made.storeys:
+        print(f"{out / each.storey}: scans/, truth.geojson")
+    return 0
+
+
+def charge_campaign(
+    folder: Path,
+    building: str | None,
+    store: Path | None,
+    assignments: list[str],
+    jobs: int | None,
+    as_json: bool,
+) -> int:
+    """Charge MapSense, GraMap and No Processing for a campaign's scans."""
+    settings = load_settings(store=store, jobs=jobs, params=_assigned(assignments) or None)
+    root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
+    from storage.campaign import read_campaign
+
+    campaign = read_campaign(folder)
+    name = building or f"{campaign.building}.scans"
+    _check_name(name)
+    with prefect_api(root):
+        from flows.energy import EnergyRequest
+        from flows.params import parse_params
+        from flows.work import run_energy
+
+        request = EnergyRequest(
+            store=str(root),
+            folder=str(folder.resolve()),
+            building=name,
+            params=parse_params(settings.params),
+        )
+        answers = run_energy(request, settings.jobs, not as_json)
+    if as_json:
+        print(json.dumps({k: v.to_pylist() for k, v in answers.items()}, indent=1, default=str))
+        return 0
+    for title, table in answers.items():
+        print(f"\n{title}")
+        print_table(table)
+    return 0
+
+
 def run_again(
     building: str | None, storey: str | None, store: Path | None, jobs: int | None, as_json: bool
 ) -> int:
@@ -94,6 +181,8 @@ def run_again(
     settings = load_settings(store=store, jobs=jobs)
     root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
     last = last_runs(read_runs(root, building, storey))
+    # a campaign's energy is charged again by its own verb
+    last = [run for run in last if run.verb != "energy"]
     again = [run for run in last if run.state != COMPLETED and not goes_on(str(root), run)]
     if not again:
         if as_json:

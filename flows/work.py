@@ -5,12 +5,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from flows import progress
 from flows.building import map_building, with_jobs
+from flows.energy import EnergyRequest, measure_energy
 from flows.request import StoreyRequest
 from flows.server import wait_until_up
+from flows.storey import threads
+from storage.catalog import Catalog
 from storage.errors import MapSenseError
 from storage.runs import COMPLETED, Run, read_runs
+
+ENERGY_ANSWERS = {
+    "simulated joules, one query a room": "energy_per_method",
+    "saved by MapSense (simulated)": "energy_savings",
+    "how far each assumption moves the saving": "energy_sensitivity",
+    "what would bring the saving wanted": "energy_targets",
+    "the quality gate by volunteer": "quality_by_volunteer",
+    "the quality gate over T_q": "gate_curve",
+}
+"""The named queries that answer what a campaign costs, by title."""
 
 
 def run_storey(request: StoreyRequest, jobs: int, show: bool) -> dict[str, Any]:
@@ -29,6 +45,28 @@ def run_buildings(requests: list[StoreyRequest], jobs: int, show: bool) -> list[
         for building, storeys in by_building.items():
             map_building(building, storeys, jobs, return_state=True)
     return [_summary(request) for request in requests]
+
+
+def run_energy(request: EnergyRequest, jobs: int, show: bool) -> dict[str, pa.Table]:
+    """Charge the methods for a campaign; return the answers people ask for, by title."""
+    with _engine(show):
+        state = measure_energy.with_options(task_runner=threads(jobs))(request, return_state=True)
+    if not state.is_completed():
+        error = state.result(raise_on_failure=False)
+        if isinstance(error, Exception):
+            raise error
+        raise MapSenseError(f"{request.building}: {state.message}")
+    catalog = Catalog(request.store)
+    return {title: _own(catalog.query(name), request) for title, name in ENERGY_ANSWERS.items()}
+
+
+def _own(answer: pa.Table, request: EnergyRequest) -> pa.Table:
+    """Return the rows of one building; of the accumulated ones, those of one query a room."""
+    rows = pc.equal(answer["building"], request.building)
+    if "series" in answer.column_names:
+        rows = pc.and_(rows, pc.equal(answer["series"], "storey"))
+    shown = [c for c in answer.column_names if c not in ("building", "series")]
+    return answer.filter(rows).select(shown)
 
 
 def is_done(summary: dict[str, Any]) -> bool:

@@ -5,6 +5,7 @@ import os
 import shutil
 import uuid
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 import pyarrow as pa
@@ -15,30 +16,48 @@ from storage.errors import InputError, StoreError
 from storage.points import POINTS, PointCloud
 from storage.snapshots import SNAPSHOTS, Snapshots
 from tasks.scans.poses import matrices_from_quaternions
-from tasks.scans.raw import DEVICE, METRES_Z_UP, Chunk, Poses, RawCloud, in_chunks, library_errors
+from tasks.scans.raw import (
+    DEVICE,
+    METRES_Z_UP,
+    ROWS,
+    Chunk,
+    Poses,
+    RawCloud,
+    in_chunks,
+    library_errors,
+)
 from tasks.scans.raw import size_of as _size_of
+from tasks.scans.registration import register
 
 POINTS_FILE = "points.parquet"
 SNAPSHOTS_FILE = "snapshots.parquet"
 
+PointsFrame = Literal["building", "device"]
+"""The frame of a bundle's points: registered already, or still each snapshot's own."""
+
+_FRAME = b"mapsense.frame"
 _UNIT = 1e-3  # rounding of a stored quaternion; more is a mistake of the writer
 
 
 def read_bundle(folder: Path) -> RawCloud:
-    """Return the points and poses of a scan bundle."""
+    """Return the points and poses of a scan bundle, the points registered by their poses."""
     points, snapshots = folder / POINTS_FILE, folder / SNAPSHOTS_FILE
     table = _read(snapshots, SNAPSHOTS.schema)
     poses = _poses(snapshots, SNAPSHOTS.from_table(table)) if table.num_rows else None
     table = _read(points, POINTS.schema)
     _check_origin(points, table)
     _check_nulls(points, table)
+    frame = _frame(points, table)
     cloud = POINTS.from_table(table)
     del table
     _check_links(points, cloud, poses)
-    return RawCloud(_chunks(cloud), len(cloud), poses=poses, convention=METRES_Z_UP)
+    chunks = _chunks(cloud) if frame == "building" else _registered(points, cloud, poses)
+    return RawCloud(chunks, len(cloud), poses=poses, convention=METRES_Z_UP)
 
 
-def write_bundle(folder: Path, cloud: PointCloud, snapshots: Snapshots) -> None:
+def write_bundle(
+    folder: Path, cloud: PointCloud, snapshots: Snapshots, frame: PointsFrame = "building"
+) -> None:
     """Write a scan bundle: a reader sees all of it, the one before it, or nothing.
 
     Parameters
@@ -48,11 +67,24 @@ def write_bundle(folder: Path, cloud: PointCloud, snapshots: Snapshots) -> None:
     cloud : PointCloud
     snapshots : Snapshots
         Of 0 rows if the cloud has none.
+    frame : "building" or "device"
+        Whether the points are registered, or in the device frame of their snapshot.
+
+    Raises
+    ------
+    ValueError
+        If points of the device frame have no snapshots, or an origin.
+    StoreError
+        If the folder cannot be written.
     """
+    if frame == "device" and (cloud.snapshot is None or not len(snapshots) or cloud.origin.any()):
+        raise ValueError("cloud: points of the device frame need snapshots, and no origin")
     temporary = folder.parent / f".{folder.name}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
     try:
         temporary.mkdir(parents=True)
-        _write(temporary / POINTS_FILE, POINTS.to_table(cloud), POINTS.write_options)
+        points = POINTS.to_table(cloud)
+        points = points.replace_schema_metadata(points.schema.metadata | {_FRAME: frame.encode()})
+        _write(temporary / POINTS_FILE, points, POINTS.write_options)
         _write(temporary / SNAPSHOTS_FILE, SNAPSHOTS.to_table(snapshots), SNAPSHOTS.write_options)
         _put_in_place(temporary, folder)
     except OSError as error:
@@ -117,6 +149,14 @@ def _check_origin(path: Path, table: pa.Table) -> None:
         raise _foreign(path, f"metadata 'mapsense.origin_m' is {text.decode()!r}, expected [x,y,z]")
 
 
+def _frame(path: Path, table: pa.Table) -> str:
+    """Return the frame of the points; a bundle that says none was written registered."""
+    frame = (table.schema.metadata or {}).get(_FRAME, b"building").decode("utf-8", "replace")
+    if frame not in get_args(PointsFrame):
+        raise _foreign(path, f"metadata 'mapsense.frame' is {frame!r}, expected building or device")
+    return frame
+
+
 def _check_nulls(path: Path, table: pa.Table) -> None:
     for name in ("x_mm", "y_mm", "z_mm"):
         if table[name].null_count:
@@ -157,6 +197,17 @@ def _chunks(cloud: PointCloud) -> list[Chunk]:
         chunks.append(Chunk(xyz, None if cloud.snapshot is None else cloud.snapshot[start:stop]))
         start = stop
     return chunks
+
+
+def _registered(path: Path, cloud: PointCloud, poses: Poses | None) -> list[Chunk]:
+    if poses is None or cloud.snapshot is None:
+        raise _foreign(path, "holds points in the device frame, but no snapshots to register by")
+    if cloud.origin.any():
+        raise _foreign(path, "holds points in the device frame, yet 'mapsense.origin_m' is not 0")
+    starts = range(0, len(cloud), ROWS)
+    links = [cloud.snapshot[start : start + ROWS] for start in starts]
+    parts = [cloud.xyz[start : start + ROWS] for start in starts]
+    return [Chunk(register(xyz, of, poses), of) for xyz, of in zip(parts, links, strict=True)]
 
 
 def _foreign(path: Path, what: str) -> InputError:

@@ -12,16 +12,8 @@ from pydantic import Field, PositiveInt, model_validator
 
 from storage.errors import InputError
 from tasks.params import Params
-from tasks.scans.raw import (
-    CAMERA,
-    FLOAT32_LIMIT,
-    Chunk,
-    Convention,
-    Poses,
-    RawCloud,
-    size_of,
-    unreadable,
-)
+from tasks.scans.raw import CAMERA, Chunk, Convention, Poses, RawCloud, size_of, unreadable
+from tasks.scans.registration import register
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -100,20 +92,15 @@ def back_project(
     convention : Convention
         Passed on, as the notes are.
     """
+    poses = Poses(frames.times, frames.positions, frames.rotations, CAMERA)
     chunks: list[Chunk] = []
     read = 0
     for index, path in enumerate(frames.images):
         depth = read_depth(path)[:: params.depth_stride, :: params.depth_stride]
         seen = _in_camera(depth, intrinsics, factor, params)
-        far = np.abs(frames.positions[index]).max() + params.depth_max > FLOAT32_LIMIT
-        points = seen if far else seen.astype(np.float32)
-        # the product in the precision the result needs: most of the time goes here
-        rotation = frames.rotations[index].astype(points.dtype)
-        position = frames.positions[index].astype(points.dtype)
-        chunks.append(Chunk(points @ rotation.T + position, index))
+        chunks.append(Chunk(register(seen, index, poses), index))
         read += depth.size
     kept = sum(len(chunk.xyz) for chunk in chunks)
-    poses = Poses(frames.times, frames.positions, frames.rotations, CAMERA)
     return RawCloud(chunks, read, read - kept, poses, convention, notes)
 
 

@@ -1,141 +1,185 @@
-"""Tables, chairs and cabinets put into rooms by trial: no two overlap, doors stay clear."""
+"""Furniture put into rooms by their class; doors stay clear, and only chairs reach under tables."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
-from shapely import Polygon, box
-from shapely.affinity import rotate, translate
+from pydantic import Field, PositiveFloat
+from shapely import Polygon
 
 from storage.plan import PlanFurniture, PlanOpening, PlanRoom
+from tasks.params import Params
+from tasks.simulation import furniture
+from tasks.simulation.furniture import BEHIND_M, Corners, Group, Piece
+from tasks.simulation.placing import Maker, Places, along_walls, extent, in_the_open, on_grid
 
-Piece = tuple[str, Polygon, float]
-"""class, footprint around the group's centre, top in metres"""
+ALL = 1000
+"""More than any room holds."""
+MOST_RUNS = 10
+"""Runs of cabinets, and pieces of clutter, that a large hall holds. Assumption."""
+P_SIDEWAYS = 0.5
+"""Share of desks with a narrow side to the wall. Assumption."""
+DOOR_SIDE_M, DOOR_DEPTH_M = 0.2, 0.45
+"""Floor kept clear beside a door, and before it beyond the leaf's width (half the thickest wall
+included). Assumption."""
 
-TABLE_TOP_M = 0.74
-"""Height of a fixed desk: EN 527-1 asks for 740 +- 20 mm."""
-CHAIR_SIDE_M, CHAIR_TOP_M = 0.46, 0.84
-"""A plain visitor's chair: total height; catalogues give 800 to 1100 mm. Assumption."""
-CABINET_TOP_M = 1.9
-"""Five file heights. Assumption."""
-DOOR_CLEAR_M = 1.0
-"""Nothing stands this near to a door's middle. Assumption."""
-AISLE_M = 0.5
-"""Free floor between two groups of furniture. Assumption."""
-WALL_GAP_M = 0.03
-"""What keeps furniture off the wall: a skirting board. Assumption."""
-TRIALS = 60
-"""Draws for one group before the room goes without it."""
+
+class FurnishingParams(Params):
+    """How densely rooms are furnished. Assumptions unless a source is given."""
+
+    workplace_m2: PositiveFloat = 8.0
+    """Floor area of one workplace, m2 (ASR A1.2: 8 m2 for one, 6 m2 for each further)."""
+    open_workplace_m2: PositiveFloat = 8.0
+    """Floor area of one workplace of an open-plan office, m2; fuller than ASR A1.2's 12 to 15."""
+    cabinet_m2: PositiveFloat = 10.0
+    """Floor area per run of cabinets or shelves, m2."""
+    clutter_m2: PositiveFloat = 12.0
+    """Floor area per bin, box or plant, m2."""
+    corridor_m2: PositiveFloat = 25.0
+    """Corridor area per run of cabinets, m2."""
+    p_pushed_in: float = Field(default=0.45, ge=0, le=1)
+    """Share of chairs pushed under their table, half hidden."""
+    column_grid_m: float = Field(default=4.8, ge=3.0)
+    """Distance of the columns in an open-plan office, metres: two facade modules."""
+    column_m: float = Field(default=0.3, ge=0, le=0.8)
+    """Side of a column, metres; 0 builds none."""
 
 
 def furnish(
-    rooms: tuple[PlanRoom, ...], doors: tuple[PlanOpening, ...], rng: np.random.Generator
+    rooms: Sequence[PlanRoom],
+    doors: Sequence[PlanOpening],
+    params: FurnishingParams,
+    rng: np.random.Generator,
 ) -> tuple[PlanFurniture, ...]:
-    """Return the furniture of all rooms; a group that finds no space is left out."""
-    clear = shapely.union_all([d.line.centroid.buffer(DOOR_CLEAR_M) for d in doors])
+    """Return the furniture of all rooms; a group that finds no space is left out.
+
+    Ids start with the kind of piece (`desk-7`), which decides its shape in the mesh.
+    """
+    clear = shapely.union_all([_clear_floor(door) for door in doors])
     placed: list[PlanFurniture] = []
     for room in rooms:
-        for class_, footprint, top in _furnish_room(room, clear, rng):
-            id_ = f"f{len(placed) + 1}"
-            placed.append(PlanFurniture(id_, footprint, class_, 0.0, top, room.id))
+        for piece, corners in _furnish_room(room, clear, params, rng):
+            placed.append(
+                PlanFurniture(
+                    id=f"{piece.kind}-{len(placed) + 1}",
+                    footprint=Polygon(corners),
+                    class_=piece.class_,
+                    base_m=piece.base_m + (room.floor_m or 0.0),
+                    top_m=piece.top_m + (room.floor_m or 0.0),
+                    room=room.id,
+                )
+            )
     return tuple(placed)
 
 
+def _clear_floor(door: PlanOpening) -> Polygon:
+    """Return the floor on both sides of a door that its leaf and people need."""
+    a, b = shapely.get_coordinates(door.line)
+    along = (b - a) / door.line.length
+    across = np.array((-along[1], along[0])) * (door.line.length + DOOR_DEPTH_M)
+    a, b = a - DOOR_SIDE_M * along, b + DOOR_SIDE_M * along
+    return Polygon((a - across, b - across, b + across, a + across))
+
+
 def _furnish_room(
-    room: PlanRoom, clear: shapely.Geometry, rng: np.random.Generator
-) -> Iterator[Piece]:
-    free = room.polygon.buffer(-WALL_GAP_M / 2, join_style="mitre").difference(clear)
-    for against_wall, group in _groups(room.class_, room.polygon.area, rng):
-        place = _against_a_wall if against_wall else _in_the_open
-        for _ in range(TRIALS):
-            pieces = place(group, room.polygon, rng)
-            taken = shapely.union_all([footprint for _, footprint, _ in pieces])
-            if free.contains(taken):
-                free = free.difference(taken.buffer(AISLE_M))
-                yield from pieces
+    room: PlanRoom,
+    clear: shapely.Geometry,
+    params: FurnishingParams,
+    rng: np.random.Generator,
+) -> Iterator[tuple[Piece, Corners]]:
+    free = room.polygon.buffer(-BEHIND_M / 2, join_style="mitre").difference(clear)
+    for places, make, most in _programme(room, params):
+        for place, group in places(make, room.polygon, rng):
+            if most == 0:
                 break
+            floor = Polygon(place(group.floor))
+            shapely.prepare(free)
+            if free.contains(floor):
+                most -= 1
+                free = free.difference(floor)
+                yield from ((piece, place(piece.corners)) for piece in group.pieces)
 
 
-def _groups(
-    class_: str | None, area_m2: float, rng: np.random.Generator
-) -> list[tuple[bool, list[Piece]]]:
-    """Return what a room of a class holds: (whether against a wall, pieces) per group."""
-    cabinet = (True, [_cabinet(rng)])
-    match class_:
-        case "office":
-            desks = [(False, _desk(rng)) for _ in range(2 if area_m2 > 14 else 1)]
-            return [*desks, cabinet]
+def _programme(room: PlanRoom, params: FurnishingParams) -> Iterator[tuple[Places, Maker, int]]:
+    """Yield what a room of a class holds, where it is tried and how often, the bulky first."""
+    area, pushed = room.polygon.area, params.p_pushed_in
+    length, depth = extent(room.polygon)
+    match room.class_:
+        case "office" | "assistant":
+            yield from _times(area / params.workplace_m2, along_walls, _workplace(pushed))
+        case "executive":
+            yield along_walls, _workplace(pushed), 1
+            yield in_the_open, lambda r: furniture.table_with_chairs(1.4, 0.8, 2, pushed, r), 1
+        case "open_office":
+            if params.column_m > 0 and room.ceiling_m is not None:
+                column = furniture.column(room.ceiling_m, params.column_m, params.column_grid_m)
+                yield on_grid, lambda _: column, ALL
+            pairs = 3 if area > 100 else 2
+            blocks = max(1, round(area / params.open_workplace_m2 / (2 * pairs)))
+            yield on_grid, lambda r: furniture.desk_block(pairs, pushed, r), blocks
+            yield in_the_open, lambda r: furniture.desk_block(1, pushed, r), 1
+            yield from _times(2, along_walls, lambda r: furniture.chair_row(3, r))
+        case "seminar":
+            tables = int(np.clip((depth - 1.6) // 1.4, 1, 4))
+            row = lambda r: furniture.turned(furniture.seminar_row(tables, pushed, r))  # noqa: E731
+            yield on_grid, row, ALL
+            # before a door a shorter row may fit
+            yield from _times(2, in_the_open, _short_row(tables, pushed))
+            yield along_walls, lambda r: furniture.chair_row(4, r), 1
         case "meeting":
-            return [(False, _seats(2.0, 1.0, (2, 2), rng)), cabinet]
+            yield in_the_open, _conference(int(np.clip((length - 2.4) // 0.75, 1, 6)), pushed), 1
+            yield along_walls, lambda r: furniture.chair_row(2, r), 1
+        case "lab":
+            yield on_grid, furniture.bench, ALL
+            yield from _times(2, along_walls, lambda _: furniture.wall_bench())
         case "kitchen":
-            return [(False, _seats(0.8, 0.8, (1, 1), rng)), cabinet, cabinet]
+            yield along_walls, furniture.kitchenette, 1
+            table = lambda r: furniture.table_with_chairs(0.8, 0.8, 1, pushed, r)  # noqa: E731
+            yield from _times(area / 12, in_the_open, table)
         case "storage":
-            return [cabinet, cabinet]
+            yield from _times(area / 3, along_walls, _run(furniture.shelves, 3))
+        case "wc":
+            yield along_walls, furniture.washbasins, 1
+        case "corridor":
+            yield from _times(area / params.corridor_m2, along_walls, _run(furniture.cabinets, 2))
         case _:
-            return []
+            return
+    if room.class_ not in ("kitchen", "wc", "corridor"):
+        runs = min(max(2, area / params.cabinet_m2), MOST_RUNS)
+        yield from _times(runs / 2, along_walls, _run(furniture.cabinets, 3))
+        yield from _times(runs / 2, along_walls, _run(furniture.shelves, 2))
+    clutter = min(area / params.clutter_m2, MOST_RUNS)
+    yield from _times(clutter, along_walls, furniture.clutter)
 
 
-def _desk(rng: np.random.Generator) -> list[Piece]:
-    """Return a 1600 x 800 mm desk, the commonest of EN 527-1, and a chair before it."""
-    return _seats(1.6, 0.8, (1, 0), rng)
+def _times(n: float, places: Places, make: Maker) -> Iterator[tuple[Places, Maker, int]]:
+    yield from ((places, make, 1) for _ in range(max(1, round(n))))
 
 
-def _seats(
-    length: float, depth: float, chairs: tuple[int, int], rng: np.random.Generator
-) -> list[Piece]:
-    """Return a table with some chairs on its two long sides, drawn up as people leave them."""
-    pieces: list[Piece] = [("table", _rectangle(length, depth), TABLE_TOP_M)]
-    for side, n in zip((-1, 1), chairs, strict=True):
-        for i in range(n):
-            x = (i + 0.5) * length / n - length / 2 + rng.uniform(-0.05, 0.05)
-            y = side * (depth / 2 + CHAIR_SIDE_M / 2 + rng.uniform(0.1, 0.25))
-            chair = rotate(_rectangle(CHAIR_SIDE_M, CHAIR_SIDE_M), rng.uniform(-15, 15))
-            pieces.append(("chair", translate(chair, x, y), CHAIR_TOP_M))
-    return pieces
+def _short_row(most: int, pushed: float) -> Maker:
+    def make(rng: np.random.Generator) -> Group:
+        tables = int(rng.integers(1, most, endpoint=True))
+        return furniture.turned(furniture.seminar_row(tables, pushed, rng))
+
+    return make
 
 
-def _cabinet(rng: np.random.Generator) -> Piece:
-    return ("other", _rectangle(float(rng.choice([0.8, 1.0, 1.2])), 0.42), CABINET_TOP_M)
+def _conference(most: int, pushed: float) -> Maker:
+    def make(rng: np.random.Generator) -> Group:
+        seats = int(rng.integers(1, most, endpoint=True))
+        length = max(0.75 * seats, 1.2)
+        return furniture.table_with_chairs(length, 1.1 if seats > 2 else 0.8, seats, pushed, rng)
+
+    return make
 
 
-def _rectangle(length: float, depth: float) -> Polygon:
-    return box(-length / 2, -depth / 2, length / 2, depth / 2)
+def _workplace(pushed: float) -> Maker:
+    def make(rng: np.random.Generator) -> Group:
+        desk = furniture.workplace(pushed, rng)
+        return furniture.sideways(desk) if rng.uniform() < P_SIDEWAYS else desk
+
+    return make
 
 
-def _in_the_open(group: list[Piece], room: Polygon, rng: np.random.Generator) -> list[Piece]:
-    """Return the group somewhere in the room, square to a wall drawn at random."""
-    start, end = _wall_of(room, rng)
-    low_x, low_y, high_x, high_y = room.bounds
-    x, y = rng.uniform((low_x, low_y), (high_x, high_y))
-    return _moved(group, np.arctan2(*(end - start)[::-1]), np.array((x, y)))
-
-
-def _against_a_wall(group: list[Piece], room: Polygon, rng: np.random.Generator) -> list[Piece]:
-    """Return the group with its long side against a wall drawn at random."""
-    start, end = _wall_of(room, rng)
-    along = (end - start) / np.linalg.norm(end - start)
-    inwards = np.array((-along[1], along[0]))  # the ring runs anticlockwise
-    depth = max(footprint.bounds[3] for _, footprint, _ in group)
-    centre = start + rng.uniform() * (end - start) + (depth + WALL_GAP_M) * inwards
-    return _moved(group, np.arctan2(along[1], along[0]), centre)
-
-
-def _wall_of(
-    room: Polygon, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    ring = shapely.get_coordinates(shapely.orient_polygons(room).exterior)
-    lengths = np.linalg.norm(np.diff(ring, axis=0), axis=1)
-    edge = rng.choice(len(lengths), p=lengths / lengths.sum())
-    return ring[edge], ring[edge + 1]
-
-
-def _moved(group: list[Piece], angle_rad: float, to: NDArray[np.float64]) -> list[Piece]:
-    return [
-        (
-            class_,
-            translate(rotate(footprint, angle_rad, origin=(0, 0), use_radians=True), *to),
-            top,
-        )
-        for class_, footprint, top in group
-    ]
+def _run(make: Callable[[int, np.random.Generator], Group], most: int) -> Maker:
+    return lambda rng: make(int(rng.integers(1, most, endpoint=True)), rng)

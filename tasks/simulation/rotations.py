@@ -1,5 +1,6 @@
 """Unit quaternions (a, b, c, d), scalar first, Hamilton's product."""
 
+import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -38,3 +39,17 @@ def matrices(quaternions: Quaternions) -> NDArray[np.float64]:
         (2 * (b * d - a * c), 2 * (c * d + a * b), 1 - 2 * (b * b + c * c)),
     )
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+@nb.njit(cache=True, nogil=True)
+def turned(
+    turns: NDArray[np.float64], of: NDArray[np.int32], vectors: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (n, 3) vectors, each turned by its own one of (k, 3, 3) rotation matrices."""
+    out = np.empty_like(vectors)
+    for i in range(vectors.shape[0]):
+        x, y, z = vectors[i, 0], vectors[i, 1], vectors[i, 2]
+        for axis in range(3):
+            R = turns[of[i], axis]
+            out[i, axis] = R[0] * x + R[1] * y + R[2] * z
+    return out

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import PositiveFloat
+from scipy.spatial import cKDTree
 
 from storage.planes import PlaneLabels, Planes
 from storage.points import PointCloud
@@ -14,6 +15,9 @@ from storage.snapshots import Snapshots
 from tasks.params import Params
 from tasks.surfaces.hulls import alpha_shape
 from tasks.surfaces.patches import members
+
+SIDED = 500
+"""Points of a plane that tell from which side it was seen."""
 
 
 class FilterParams(Params):
@@ -46,9 +50,9 @@ def extract_segments(
     kinds = np.full(len(planes), KINDS.index("clutter"), np.int8)
     kinds[ups < params.eps_sur] = KINDS.index("vertical")
     kinds[1 - ups < params.eps_sur] = KINDS.index("horizontal")
-    sensors = _sensors(points, snapshots)
+    seen_from = _Sensors(points, snapshots)
     rows = [
-        _segment(points, planes, i, inliers[i], KINDS[kinds[i]], sensors, params)
+        _segment(points, planes, i, inliers[i], KINDS[kinds[i]], seen_from, params)
         for i in range(len(planes))
     ]
     return Segments(
@@ -67,11 +71,27 @@ def extract_segments(
     )
 
 
-def _sensors(points: PointCloud, snapshots: Snapshots) -> NDArray[np.float64] | None:
-    """Return where each snapshot was taken, relative to the cloud's origin; None if unknown."""
-    if points.snapshot is None or len(snapshots) == 0:
-        return None
-    return snapshots.positions - points.origin
+class _Sensors:
+    """From where each point was seen; nothing is known of a cloud without poses."""
+
+    def __init__(self, points: PointCloud, snapshots: Snapshots) -> None:
+        self._snapshot = points.snapshot
+        self._positions = snapshots.positions - points.origin
+        self._tree = cKDTree(self._positions) if len(snapshots) else None
+
+    def of(
+        self, inliers: NDArray[np.int64], xyz: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Return (m, 3) places of the sensor, relative to the cloud's origin; None if unknown.
+
+        A voxel of many snapshots, or a decoded point, tells none: the nearest one stands for it.
+        """
+        if self._tree is None:
+            return None
+        if self._snapshot is not None:
+            return self._positions[self._snapshot[inliers]]
+        step = max(1, len(xyz) // SIDED)
+        return self._positions[self._tree.query(xyz[::step])[1]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,16 +114,17 @@ def _segment(
     i: int,
     inliers: NDArray[np.int64],
     kind: str,
-    sensors: NDArray[np.float64] | None,
+    seen_from: _Sensors,
     params: FilterParams,
 ) -> _Row:
     xyz = points.xyz[inliers].astype(np.float64)
     normal, offset = planes.normals[i], planes.offsets[i]
     known = False
-    if sensors is not None and points.snapshot is not None:
-        seen_from = sensors[points.snapshot[inliers]] @ normal - offset
-        known = bool(np.abs(np.mean(np.sign(seen_from))) > 0.5)
-        if known and np.median(seen_from) < 0:
+    sensors = seen_from.of(inliers, xyz)
+    if sensors is not None:
+        before = sensors @ normal - offset
+        known = bool(np.abs(np.mean(np.sign(before))) > 0.5)
+        if known and np.median(before) < 0:
             normal, offset = -normal, -offset
     heights = np.percentile(xyz[:, 2], [1, 99]) + points.origin[2]
     offset = offset + float(normal @ points.origin)

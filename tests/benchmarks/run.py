@@ -15,15 +15,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from codec import codec
 from planes import planes
 from readers import memory, readers
 from report import Report, machine
 from storey import storey
+from voxels import voxels
 
 SECTIONS: dict[str, Callable[[bool], Report]] = {
     "planes": planes,
     "storey": storey,
     "readers": readers,
+    "voxels": voxels,
+    "codec": codec,
     "memory": memory,
 }
 """A section takes `quick` and returns its report. A new one is added here."""

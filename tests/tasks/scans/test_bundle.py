@@ -1,9 +1,12 @@
 """The scan bundle: its round trip, and what is wrong with foreign ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from scipy.spatial.transform import Rotation
 
 from storage.errors import InputError, StoreError
 from storage.points import PointCloud
@@ -68,6 +71,55 @@ def test_a_bundle_is_not_written_over_other_files(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.scan"]
 
 
+def in_device_frame(n=500):
+    """Return a cloud in the device frame of its snapshots, and each point in the building's."""
+    cloud, snapshots = example(n)
+    turns = Rotation.from_quat(snapshots.rotations[:, [1, 2, 3, 0]])[cloud.snapshot]
+    return cloud, snapshots, turns.apply(cloud.xyz) + snapshots.positions[cloud.snapshot]
+
+
+def test_points_in_the_device_frame_are_registered_by_their_poses(tmp_path):
+    cloud, snapshots, expected = in_device_frame()
+    write_bundle(tmp_path / "a.scan", cloud, snapshots, frame="device")
+    got, poses, scan = read(tmp_path / "a.scan")
+    assert np.allclose(got.xyz, expected, atol=2e-6)
+    assert np.array_equal(got.snapshot, cloud.snapshot)
+    assert np.allclose(poses.positions, snapshots.positions)
+    assert (scan.points_read, scan.points_kept) == (500, 500)
+
+
+def test_a_device_far_from_the_origin_is_registered_to_the_millimetre(tmp_path):
+    cloud, snapshots, expected = in_device_frame()
+    far = np.array([512_345.678, 5_412_345.678, 250.0])
+    moved = replace(snapshots, positions=snapshots.positions + far)
+    write_bundle(tmp_path / "a.scan", cloud, moved, frame="device")
+    got, _, _ = read(tmp_path / "a.scan")
+    assert np.allclose(got.origin + got.xyz, expected + far, atol=1e-3)
+
+
+def test_a_bundle_that_names_no_frame_is_registered_already(tmp_path):
+    cloud, snapshots = example()
+    write_bundle(tmp_path / "a.scan", cloud, snapshots)
+    file = tmp_path / "a.scan" / POINTS_FILE
+    table = pq.read_table(file)
+    assert table.schema.metadata[b"mapsense.frame"] == b"building"
+    pq.write_table(of_frame(None)(table), file)
+    assert np.allclose(read(tmp_path / "a.scan")[0].xyz, cloud.xyz, atol=1e-5)
+
+
+def test_device_points_without_snapshots_or_with_an_origin_are_not_written_failure(tmp_path):
+    cloud, snapshots = example()
+    far = PointCloud(cloud.xyz, np.array([1.0, 0, 0]), cloud.snapshot)
+    for points, poses in (
+        (PointCloud(cloud.xyz, cloud.origin), snapshots),
+        (cloud, none()),
+        (far, snapshots),
+    ):
+        with pytest.raises(ValueError, match="need snapshots, and no origin"):
+            write_bundle(tmp_path / "a.scan", points, poses, frame="device")
+    assert not (tmp_path / "a.scan").exists()
+
+
 def without(name):
     return lambda table: table.drop_columns([name])
 
@@ -76,6 +128,15 @@ def of_version(version):
     def change(table):
         metadata = table.schema.metadata | {b"mapsense.schema_version": version}
         return table.replace_schema_metadata(metadata)
+
+    return change
+
+
+def of_frame(name, origin="[0.0, 0.0, 0.0]"):
+    def change(table):
+        metadata = {k: v for k, v in table.schema.metadata.items() if k != b"mapsense.frame"}
+        metadata[b"mapsense.origin_m"] = origin.encode()
+        return table.replace_schema_metadata(metadata | ({b"mapsense.frame": name} if name else {}))
 
     return change
 
@@ -108,6 +169,13 @@ def of_values(name, values):
         (POINTS_FILE, of_values("snapshot", [9] * 500), "runs from 9 to 9, there are 4 snapshots"),
         (POINTS_FILE, of_values("snapshot", [1, None] * 250), "empty in 250 of 500 rows"),
         (POINTS_FILE, of_values("x_mm", [1, None] * 250), "'x_mm' has 250 empty values"),
+        (POINTS_FILE, of_frame(b"camera"), "metadata 'mapsense.frame' is 'camera', expected"),
+        (POINTS_FILE, of_frame(b"device", "[1, 0, 0]"), "'mapsense.origin_m' is not 0"),
+        (
+            POINTS_FILE,
+            lambda t: of_frame(b"device")(of_values("snapshot", [None] * 500)(t)),
+            "no snapshots to register by",
+        ),
         (SNAPSHOTS_FILE, of_values("qa", [5.0] * 4), "row 0 is no pose"),
         (SNAPSHOTS_FILE, of_values("x_m", [0, 0, np.nan, 0]), "row 2 is no pose"),
     ],

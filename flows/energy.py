@@ -1,0 +1,181 @@
+"""What a campaign costs its devices: MapSense, GraMap and No Processing on the same scans."""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from prefect import flow
+from prefect.futures import PrefectFuture
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from flows import progress, stages
+from flows.params import MapSenseParams
+from flows.storey import threads
+from storage.artifacts import Place, check_name, read
+from storage.campaign import Campaign, CampaignScan, read_campaign
+from storage.quality import QUALITY
+from storage.room_errors import ROOM_ERRORS
+from storage.runs import Run, new_id, recorded
+from storage.sources import Source
+from storage.streams import STREAMS
+from tasks.device.codec import CodecParams
+from tasks.device.work import Tally
+from tasks.evaluation.rooms import EvaluateParams
+from tasks.scans.sources import find_sources
+
+VERB = "energy"
+GRAMAP = CodecParams(profile="low")
+"""GraMap compresses all points at the low profile."""
+WHOLE = "campaign"
+"""Stands for a storey where all of them together are meant."""
+
+
+class EnergyRequest(BaseModel):
+    """Charge the methods for the scans of a campaign."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    store: str
+    """Folder of the store."""
+    folder: str
+    """Folder of the campaign."""
+    building: str
+    """Name its results are kept under: of its own, for each scan is mapped alone here."""
+    params: MapSenseParams = MapSenseParams()
+    """Parameters of the stages."""
+    run: str = Field(default_factory=new_id)
+    """Id of the run."""
+
+    @field_validator("building")
+    @classmethod
+    def _is_a_name(cls, value: str) -> str:
+        return check_name(value)
+
+    def place(self, storey: str) -> Place:
+        """Return the place of a storey."""
+        return Place(store=self.store, run=self.run, building=self.building, storey=storey)
+
+
+@flow(name=VERB, flow_run_name="{request.building}", task_runner=threads())
+def measure_energy(request: EnergyRequest) -> None:
+    """Count each scan's work and bytes, map each alone, and charge the methods (Fig. 19)."""
+    campaign = read_campaign(Path(request.folder))
+    params = request.params
+    tallies = [row for storey in campaign.storeys for row in _storey(request, campaign, storey)]
+    place = request.place(WHOLE)
+    with recorded(request.store, _run(request, WHOLE)) as record:
+        work = stages.scan_work(place, params.work.model_copy(update={"scans": tuple(tallies)}))
+        energy = stages.energy(place, work, params.energy)
+        stages.savings(place, energy)
+        stages.energy_sweep(place, work, params.energy, params.sweep)
+        stages.energy_targets(place, work, params.energy, params.targets)
+        record.end("completed", "")
+
+
+def _run(request: EnergyRequest, storey: str) -> Run:
+    return Run(
+        id=request.run,
+        verb=VERB,
+        building=request.building,
+        storey=storey,
+        asked=request.model_dump_json(),
+        started_at=datetime.now(UTC),
+    )
+
+
+def _storey(request: EnergyRequest, campaign: Campaign, storey: Any) -> list[Tally]:
+    """Return what was counted of each scan of a storey; one that cannot be read is left out."""
+    folder = Path(request.folder)
+    scans = {scan.scan: scan for scan in storey.scans}
+    sources, errors = find_sources([folder / scan.path for scan in storey.scans])
+    truth = _truth(folder / storey.truth)
+    place = request.place(storey.storey)
+    progress.expect(place, PER_SCAN * len(sources))
+    with recorded(request.store, _run(request, storey.storey)) as record:
+        made = {s.name: _submit(request, place.of_scan(s.name), s, truth, scans) for s in sources}
+        tallies, failed = [], [error.path for error in errors]
+        for name, futures in made.items():
+            tally = _tally(request, storey.storey, scans[name], futures)
+            tallies += [tally] if tally else []
+            failed += [] if tally else [name]
+        record.end("partial" if failed else "completed", _left_out(failed))
+    return tallies
+
+
+PER_SCAN = 12
+
+
+def _submit(
+    request: EnergyRequest,
+    place: Place,
+    source: Source,
+    truth: Source,
+    scans: dict[str, CampaignScan],
+) -> dict[str, PrefectFuture[Any]]:
+    """Hand one scan's stages to the task runner: its device side, and its mapping alone."""
+    p = request.params
+    clouds = stages.clouds.submit(place, source, p.scans)
+    quality = stages.quality.submit(place, clouds, p.quality)
+    voxels = stages.voxels.submit(place, clouds, p.voxels)
+    streams = stages.streams.submit(place, voxels, p.codec)
+    gramap = stages.streams.submit(place, clouds, GRAMAP)
+    points = stages.decoded.submit(place, streams)
+    planes = stages.planes.submit(place, points, p.hough)
+    segments = stages.segments.submit(place, points, clouds, planes, planes, p.filter)
+    space = stages.occupancy.submit(place, points, p.occupancy)
+    faces = stages.faces.submit(place, [segments], p.label)
+    rooms = stages.rooms.submit(place, faces, faces, [space], p.intersect)
+    asked = EvaluateParams(rooms=(scans[source.name].room,))
+    errors = stages.room_errors.submit(place, rooms, truth, asked)
+    return {"quality": quality, "streams": streams, "gramap": gramap, "errors": errors}
+
+
+def _tally(
+    request: EnergyRequest, storey: str, scan: CampaignScan, futures: dict[str, PrefectFuture[Any]]
+) -> Tally | None:
+    """Return what was counted of a scan; None if its device side failed."""
+    done = {name for name, future in futures.items() if _is_done(future)}
+    if not done >= {"quality", "streams", "gramap"}:
+        return None
+    store = request.store
+    quality = read(QUALITY, futures["quality"].result(), store)
+    stream = read(STREAMS, futures["streams"].result(), store)
+    gramap = read(STREAMS, futures["gramap"].result(), store)
+    iou = 0.0  # what cannot be mapped at all is of no use
+    if "errors" in done:
+        iou = float(read(ROOM_ERRORS, futures["errors"].result(), store).iou[0])
+    return Tally(
+        storey=storey,
+        room=scan.room,
+        scan=scan.scan,
+        volunteer=scan.volunteer,
+        duration_s=scan.duration_s,
+        raw_points=scan.points,
+        voxel_points=stream.points,
+        snapshots=quality.snapshots,
+        p_sum=quality.p_sum,
+        bytes_mapsense=len(stream.data),
+        bytes_gramap=len(gramap.data),
+        iou=iou,
+    )
+
+
+def _is_done(future: PrefectFuture[Any]) -> bool:
+    future.wait()
+    return future.state.is_completed()
+
+
+def _left_out(failed: Iterable[str]) -> str:
+    names = ", ".join(failed)
+    return f"left out, their device side failed: {names}" if names else ""
+
+
+def _truth(path: Path) -> Source:
+    """Return the true plan as a stage's input."""
+    from hashlib import sha256
+
+    data = path.read_bytes()
+    return Source(
+        name="truth", path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data)
+    )
