@@ -31,7 +31,7 @@ class FurnishingParams(Params):
     """Floor area of one workplace, m2 (ASR A1.2: 8 m2 for one, 6 m2 for each further)."""
     open_workplace_m2: PositiveFloat = 8.0
     """Floor area of one workplace of an open-plan office, m2; fuller than ASR A1.2's 12 to 15."""
-    cabinet_m2: PositiveFloat = 10.0
+    cabinet_m2: PositiveFloat = 8.0
     """Floor area per run of cabinets or shelves, m2."""
     clutter_m2: PositiveFloat = 12.0
     """Floor area per bin, box or plant, m2."""
