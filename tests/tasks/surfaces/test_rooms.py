@@ -1,6 +1,5 @@
 """Rooms end to end: clouds sampled from known room polygons become those polygons again."""
 
-from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -17,7 +16,6 @@ from storage.snapshots import Snapshots, none
 from tasks.scans.raw import DEVICE, Poses
 from tasks.scans.registration import register
 from tasks.simulation.campaign import CampaignParams, simulate_scans
-from tasks.simulation.drift import DriftParams
 from tasks.simulation.plan import StoreyParams, make_storey
 from tasks.simulation.rotations import matrices
 from tasks.simulation.sensor import SensorParams
@@ -343,18 +341,18 @@ def test_corners_of_a_leaning_room_are_found_where_they_were_sampled():
 
 @cache
 def demo_storey():
-    """Return a simulated storey and its initial model from one scan a room and two more."""
-    plan = make_storey(StoreyParams(seed=1), "demo", "0")
-    # shelves all along a wall hide it: such a room is as large as what is left of it
-    full = {room.id for room in plan.rooms if room.class_ == "storage"}
-    plan = replace(plan, furniture=tuple(f for f in plan.furniture if f.room not in full))
+    """Return a simulated storey and its initial model from one scan a room and two more.
+
+    Furnished and with drifting poses. Where shelves hide all of a wall, their faces are the wall:
+    other seeds have such rooms.
+    """
+    plan = make_storey(StoreyParams(seed=3), "demo", "0")
     params = CampaignParams(
         scans=len(plan.rooms) + 2,
         skill=0.9,
         skill_spread=0.1,
         sensor=SensorParams(rays=6000),
         volunteer=VolunteerParams(interval_s=1.0),
-        drift=DriftParams(walk_m=0.0, walk_rad=0.0, turn_rad=0.0),
     )
     seen = []
     for scan in simulate_scans(plan, params):
@@ -387,5 +385,5 @@ def test_the_walls_between_a_simulated_storeys_rooms_have_their_thickness():
     thickness = np.array([wall.thickness_m for wall in plan.walls])[nearest]
     off = np.abs(walls.thickness_m - thickness)[between & (lengths > 1)]
     assert len(off) >= 10
-    assert np.median(off) < 0.015
+    assert np.median(off) < 0.025
     assert off.max() < 0.05
