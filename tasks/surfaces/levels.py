@@ -27,8 +27,8 @@ class Levels:
 def find_levels(scans: list[Segments], params: LabelParams) -> Levels:
     """Find floor and ceiling: the lowest and highest level of room extent (Eq. 6, 7).
 
-    Where no two levels are a room's height apart there is only one, the largest; whether it is
-    floor or ceiling is told by the side its walls lie on.
+    Where no two levels are a room's height apart one of the two was not seen. Which, is told by
+    the side of the largest level that the walls lie on.
     """
     heights, areas = _horizontals(scans)
     if not len(heights):
@@ -36,10 +36,10 @@ def find_levels(scans: list[Segments], params: LabelParams) -> Levels:
     large = _large_levels(heights, areas, params)
     floor, ceiling = float(large.min()), float(large.max())
     if ceiling - floor < params.headroom_m:
-        largest = float(large[0])  # what lies near it is a shelf or a suspended part of it
+        largest = float(large[0])
         if _walls_stand_on(scans, largest):
-            return Levels(largest, None, None)
-        return Levels(None, largest, largest)
+            return Levels(floor, None, None)  # the tops of tables may be larger
+        return Levels(None, largest, largest)  # what lies near it are suspended parts of it
     above = heights > floor + params.headroom_m
     order = np.argsort(heights[above])
     share = np.cumsum(areas[above][order]) / areas[above].sum()

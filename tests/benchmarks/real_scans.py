@@ -22,7 +22,10 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
-STAGES = ("clouds", "planes", "segments", "faces", "rooms")
+STAGES = (
+    *("clouds", "quality", "voxels", "streams"),
+    *("decoded", "planes", "segments", "occupancy", "faces", "rooms"),
+)
 
 
 @dataclass(frozen=True)
