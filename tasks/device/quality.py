@@ -26,9 +26,9 @@ class QualityParams(Params):
 
     alpha_p: NonNegativeInt = 5000
     """Most points of an incomplete snapshot (Sec. 3.2.2)."""
-    mu_rad: float = np.deg2rad(90)
+    mu_rad: float = float(np.deg2rad(90))
     """Roll of a device held correctly, radians (Sec. 3.2.2)."""
-    sigma_rad: PositiveFloat = np.deg2rad(30)
+    sigma_rad: PositiveFloat = float(np.deg2rad(30))
     """Standard deviation of the roll, radians. The paper prints a variance of 30 degrees; the unit
     is that of a standard deviation, and 5.5 degrees would reject all that look at a ceiling."""
     t_q: float = Field(default=T_Q, ge=0, le=1)

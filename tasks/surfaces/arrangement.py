@@ -130,12 +130,12 @@ def arrange(lines: Lines, border: shapely.Polygon, extension: NDArray[np.float64
 
 
 def _with_edges(cells: NDArray[np.object_], lines: Lines) -> Arrangement:
-    rings = shapely.get_exterior_ring(cells)
+    rings, cell = shapely.get_rings(cells, return_index=True)
     coords, ring = shapely.get_coordinates(rings, return_index=True)
     at = np.rint(coords / SNAP).astype(np.int64)
     same = ring[:-1] == ring[1:]
     pairs = np.concatenate([at[:-1], at[1:]], axis=1)[same]
-    owner = ring[:-1][same]
+    owner = cell[ring[:-1][same]]
     swap = (pairs[:, 0] > pairs[:, 2]) | (
         (pairs[:, 0] == pairs[:, 2]) & (pairs[:, 1] > pairs[:, 3])
     )

@@ -20,7 +20,7 @@ def room_corners(rooms: Rooms, faces: Faces) -> Corners:
     """
     edges = outline_edges(rooms, faces)
     normals, offsets = _wall_planes(edges, faces)
-    before = _previous(edges.room)
+    before = _previous(edges.ring)
     lower = _meet(edges, normals, offsets, before, rooms.floor_m)
     upper = _meet(edges, normals, offsets, before, rooms.ceiling_m)
     return Corners(edges.room, lower, upper)
@@ -39,11 +39,11 @@ def _wall_planes(
     return normals, offsets
 
 
-def _previous(room: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return for each edge the one before it in its room's outline."""
-    before = np.arange(len(room)) - 1
-    for number in np.unique(room):
-        own = np.flatnonzero(room == number)
+def _previous(ring: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return for each edge the one before it in its ring."""
+    before = np.arange(len(ring)) - 1
+    for number in np.unique(ring):
+        own = np.flatnonzero(ring == number)
         before[own[0]] = own[-1]
     return before
 

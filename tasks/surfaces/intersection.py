@@ -62,7 +62,7 @@ class IntersectParams(Params):
     wall_upright: float = Field(default=0.9, ge=0, le=1)
     """How much of a wall is seen where points stand from floor to ceiling but no plane was found,
     or one a little aside."""
-    unknown_open: float = Field(default=0.35, ge=0, le=1)
+    unknown_open: float = Field(default=0.4, ge=0, le=1)
     """How open a place is on which neither a wall was seen nor the floor or ceiling running on."""
     open_share: float = Field(default=0.3, ge=0, le=1)
     """Share of their common border from which two cells are one room."""
@@ -104,7 +104,8 @@ def intersect_walls(
     Returns
     -------
     Rooms
-        Simple polygons, disjoint; none if nothing bounds or covers a room.
+        Simple polygons, disjoint, a room around a core with a hole; none if nothing bounds or
+        covers a room.
     Walls
         The rooms' walls; two faces of one wall are one wall with a thickness.
     Corners
@@ -268,7 +269,8 @@ def _rooms_of(plane: _Plane, cells: NDArray[np.int64], params: IntersectParams) 
     walled = float(plane.wall[limit] @ plane.lengths[limit] / max(plane.lengths[limit].sum(), 1e-9))
     least = _least_seen(walled, params)
     found = []
-    for polygon in _tidy(shapely.union_all(plane.cells[cells], grid_size=cut.SNAP)):
+    whole = shapely.union_all(plane.cells[cells], grid_size=cut.SNAP)
+    for polygon in _tidy(whole, params.min_area_m2):
         inside = cells[shapely.intersects(polygon, shapely.point_on_surface(plane.cells[cells]))]
         seen = float(plane.seen[inside] @ plane.areas[inside] / polygon.area)
         if polygon.area >= params.min_area_m2 and seen >= least:
@@ -283,14 +285,23 @@ def _least_seen(walled: float, params: IntersectParams) -> float:
     return params.min_seen if walled < WALLED else params.min_seen / 5
 
 
-def _tidy(polygon: shapely.Geometry) -> list[shapely.Polygon]:
-    """Return the parts of a room without slivers, holes and corners in line."""
+def _tidy(polygon: shapely.Geometry, least: float) -> list[shapely.Polygon]:
+    """Return the parts of a room without slivers and corners in line.
+
+    Holes smaller than `least`, m2, are columns and what was not seen; around a larger one, a
+    courtyard or a core of rooms, the room runs as a ring.
+    """
     mitre = {"join_style": "mitre", "mitre_limit": 3.0}
     opened = polygon.buffer(-SLIVER, **mitre).buffer(SLIVER, **mitre)
-    outlines = [shapely.Polygon(p.exterior) for p in _polygons(opened)]
+    outlines = [_without_small_holes(p, least) for p in _polygons(opened)]
     # rounded here, so that a plan written with four decimals is as simple as the room it shows
     rounded = [shapely.set_precision(p.simplify(IN_LINE), cut.SNAP) for p in outlines]
-    return [shapely.Polygon(p.exterior) for r in rounded for p in _polygons(r)]
+    return [_without_small_holes(p, least) for r in rounded for p in _polygons(r)]
+
+
+def _without_small_holes(polygon: shapely.Polygon, least: float) -> shapely.Polygon:
+    holes = [ring for ring in polygon.interiors if shapely.Polygon(ring).area >= least]
+    return shapely.Polygon(polygon.exterior, holes)
 
 
 def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:

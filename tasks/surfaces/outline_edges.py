@@ -15,9 +15,11 @@ ON_FACE = 0.12
 
 @dataclass(frozen=True, eq=False)
 class OutlineEdges:
-    """e edges of n rooms, each room's one after another, counter-clockwise: inside is left."""
+    """e edges of n rooms, ring after ring, each edge after the one before: inside is left."""
 
     room: NDArray[np.int32]
+    ring: NDArray[np.int32]
+    """(e,), ring of each edge, counted over all rooms"""
     ends: NDArray[np.float64]
     """(e, 2, 2)"""
     outward: NDArray[np.float64]
@@ -28,16 +30,24 @@ class OutlineEdges:
 
 def outline_edges(rooms: Rooms, faces: Faces) -> OutlineEdges:
     """Return the edges of all rooms' outlines."""
-    room, ends = [], []
-    for number, polygon in enumerate(rooms.polygons):
-        ring = shapely.get_coordinates(shapely.orient_polygons(polygon).exterior)
-        room += [number] * (len(ring) - 1)
-        ends.append(np.stack([ring[:-1], ring[1:]], axis=1))
+    rings, owner = shapely.get_rings(shapely.orient_polygons(rooms.polygons), return_index=True)
+    room, ring, ends = [], [], []
+    for number, (line, of_room) in enumerate(zip(rings, owner, strict=True)):
+        at = shapely.get_coordinates(line)
+        room += [of_room] * (len(at) - 1)
+        ring += [number] * (len(at) - 1)
+        ends.append(np.stack([at[:-1], at[1:]], axis=1))
     edges = np.concatenate([*ends, np.empty((0, 2, 2))])
     spans = edges[:, 1] - edges[:, 0]
     lengths = np.maximum(np.linalg.norm(spans, axis=1, keepdims=True), 1e-9)
     outward = np.column_stack((spans[:, 1], -spans[:, 0])) / lengths
-    return OutlineEdges(np.array(room, np.int32), edges, outward, _faces_of(edges, outward, faces))
+    return OutlineEdges(
+        np.array(room, np.int32),
+        np.array(ring, np.int32),
+        edges,
+        outward,
+        _faces_of(edges, outward, faces),
+    )
 
 
 def _faces_of(

@@ -280,3 +280,29 @@ def test_the_two_faces_of_a_thin_wall_stay_two_and_are_one_wall(thickness, posed
     assert walls.thickness_m[between[0]] == pytest.approx(thickness, abs=0.02)
     assert walls.lines[between[0], :, 0] == pytest.approx(np.full(2, 4 + thickness / 2), abs=0.02)
     assert np.ptp(walls.lines[between[0], :, 1]) == pytest.approx(4, abs=0.1)
+
+
+def test_a_point_whose_snapshot_is_unknown_was_seen_from_the_nearest_one():
+    # most snapshots, and the mean of all, lie on the other side, but farther off
+    places = np.array([(1.0, 1.5, 1.4), *[(-6.0, y, 1.4) for y in (0.5, 1.0, 1.5, 2.0, 2.5)]])
+    counts = np.array([1000, *[0] * 5])
+    poses = Snapshots(np.arange(6.0), places, np.tile([1.0, 0, 0, 0], (6, 1)), counts)
+    y, z = (grid.ravel() for grid in np.meshgrid(np.arange(0, 3, 0.1), np.arange(0, HEIGHT, 0.1)))
+    xyz = np.column_stack((np.zeros(len(y)), y, z)).astype(np.float32)
+    labels = PlaneLabels(np.zeros(len(xyz), np.int32))
+    for normal in ([1.0, 0, 0], [-1.0, 0, 0]):
+        plane = Planes(
+            np.array([normal]), np.zeros(1), np.array([len(xyz)]), np.zeros(1), np.zeros(3)
+        )
+        for shift in (0.0, 100.0):
+            origin = np.array([shift, 0, 0])
+            moved = Snapshots(poses.times, places + origin, poses.rotations, counts)
+            cloud = PointCloud(xyz, origin)
+            found = extract_segments(cloud, moved, plane, labels, FilterParams())
+            assert found.side_known.tolist() == [True]
+            assert found.normals[0] == pytest.approx([1.0, 0, 0])
+            assert found.offsets[0] == pytest.approx(shift)
+
+
+def test_of_a_cloud_without_poses_no_side_is_known():
+    assert not scanned(room(0, 0, 4, 5)).side_known.any()

@@ -59,9 +59,9 @@ def sampled(polygon, seed, *, without=(), openings=()):
     openings : plan areas in which the walls are open up to 2 m
     """
     rng = np.random.default_rng(seed)
-    ring = np.array(polygon.exterior.coords)
+    edges = [e for ring in (polygon.exterior, *polygon.interiors) for e in pairwise(ring.coords)]
     parts = []
-    for number, (p, q) in enumerate(pairwise(ring)):
+    for number, (p, q) in enumerate(np.array(edges)):
         if number in without:
             continue
         length = np.linalg.norm(q - p)
@@ -387,3 +387,21 @@ def test_the_walls_between_a_simulated_storeys_rooms_have_their_thickness():
     assert len(off) >= 10
     assert np.median(off) < 0.025
     assert off.max() < 0.05
+
+
+def test_a_corridor_around_a_core_of_rooms_is_a_ring():
+    ring = box(0, 0, 14, 12).difference(box(1.8, 1.8, 12.2, 10.2))
+    core = [box(2, 2, 7, 10), box(7.2, 2, 12, 10)]
+    scans = [seen_in(sampled(p, i)) for i, p in enumerate([ring, *core])]
+    rooms, walls, corners = modelled(*scans)
+    assert len(rooms) == 3
+    for truth in (ring, *core):
+        best = max(rooms.polygons, key=lambda found: iou(found, truth))
+        assert iou(best, truth) > 0.98
+    assert shapely.union_all(rooms.polygons).area == pytest.approx(
+        sum(p.area for p in rooms.polygons)
+    )
+    # its walls face the core on their inner sides, and it has corners there too
+    between = np.isfinite(walls.thickness_m) & (walls.rooms >= 0).all(axis=1)
+    assert walls.thickness_m[between] == pytest.approx(0.2, abs=0.03)
+    assert (corners.rooms == int(np.argmax([p.area for p in rooms.polygons]))).sum() == 8
