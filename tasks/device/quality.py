@@ -13,10 +13,11 @@ from storage.quality import Quality
 from storage.snapshots import Snapshots
 from tasks.params import Params
 
-T_Q = 0.5
-"""Quality requirement where a query names none. Not in the paper. A complete scan of level views
-has p_sum 0, one of level, 35 degrees up and 35 degrees down views 0.33, one that only looks 40
-degrees down 0.59."""
+T_Q = 0.8
+"""Quality requirement where a query names none. Not in the paper: chosen on a simulated campaign of
+48 scans of two training storeys, where it keeps back two, both of no use, and leaves one of no use;
+0.5 would keep back 18 for three. A complete scan of level views has p_sum 0, one of level views and
+of some 35 degrees up and down 0.33, one that only looks 40 degrees down 0.59."""
 ON_ITS_SIDE = 1e-6
 """Sine of the angle between the device's x axis and the vertical below which Eq. 1 is noise."""
 

@@ -23,7 +23,7 @@ AXES = (
     Axis(lever="uplink_base_mw", low=132.86, high=1288.0),  # LTE (Huang et al., 2012)
     Axis(lever="throughput_mbit_s", low=5, high=40),
     Axis(lever="transfer_j", low=0.04, high=12.76),  # LTE (Huang et al., 2012)
-    Axis(lever="t_q", low=0.4, high=0.8),
+    Axis(lever="t_q", low=0.4, high=1.0),
     Axis(lever="attempts_max", low=2, high=10),
 )
 """Ranges that hold what is plausible for a hand-held device; assumptions where no source stands."""

@@ -85,7 +85,7 @@ def test_the_sweep_meets_the_simulation_at_its_own_constants():
     as_assumed = savings(simulate_energy(work, PARAMS))
     axes = tuple(
         Axis(lever=lever, low=value, high=value)
-        for lever, value in (("capture_w", 2.5), ("t_q", 0.5), ("attempts_max", 5))
+        for lever, value in (("capture_w", 2.5), ("t_q", PARAMS.t_q), ("attempts_max", 5))
     )
     # a longer axis beside it: more attempts are drawn, those of the fewer stay the same
     axes = (*axes, Axis(lever="attempts_max", low=9, high=9))
