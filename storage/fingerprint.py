@@ -14,6 +14,7 @@ from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from storage.artifacts import SCHEMA_VERSION
@@ -39,6 +40,11 @@ ALWAYS = ("numpy", "scipy", "numba", "pyarrow", "shapely")
 """Libraries that count for every stage: they reach each other without an import of ours."""
 
 
+_parsing = Lock()
+"""Before Python 3.11.5 two threads that parse at once can upset the parser's count of its depth:
+SystemError, "AST constructor recursion depth mismatch" (CPython issue 106905)."""
+
+
 def code_fingerprint(fn: Callable[..., Any]) -> str:
     """Return the hash of all code that decides what `fn` returns.
 
@@ -47,7 +53,8 @@ def code_fingerprint(fn: Callable[..., Any]) -> str:
     """
     module = sys.modules[fn.__module__]
     package = module.__package__ or ""
-    return _fingerprint(fn.__qualname__, str(module.__file__), fn.__module__, package)
+    with _parsing:
+        return _fingerprint(fn.__qualname__, str(module.__file__), fn.__module__, package)
 
 
 @cache

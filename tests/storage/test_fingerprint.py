@@ -2,11 +2,16 @@
 
 import importlib
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from storage import fingerprint
 from storage.fingerprint import code_fingerprint
+from tasks.scans.read import read_scan
+from tasks.surfaces.hough import detect_planes
+from tasks.surfaces.intersection import intersect_walls
+from tasks.surfaces.labelling import label_surfaces
 
 STAGE = """
 from lab import helper
@@ -99,3 +104,14 @@ def test_an_upgraded_library_counts(lab, monkeypatch):
     before = lab()
     monkeypatch.setattr(fingerprint, "_version", lambda library: f"{library} 99")
     assert lab() != before
+
+
+def test_threads_that_ask_at_once_get_the_same_answer():
+    # Python before 3.11.5 fails where two threads parse at the same time
+    functions = [intersect_walls, detect_planes, read_scan, label_surfaces]
+    expected = [code_fingerprint(function) for function in functions]
+    for _ in range(3):
+        fingerprint._fingerprint.cache_clear()
+        fingerprint._read.cache_clear()
+        with ThreadPoolExecutor(8) as pool:
+            assert list(pool.map(code_fingerprint, functions * 4)) == expected * 4
