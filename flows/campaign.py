@@ -1,5 +1,6 @@
 """Simulate a crowdsensing campaign: volunteers scan a building's storeys, into a folder."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -61,6 +62,8 @@ def plan_sites(path: Path, storey: str | None, params: SimulationParams) -> list
     """Return the storeys of a plan: the one of a GeoJSON file; of an IFC file all, or the named."""
     if path.suffix.lower() != ".ifc":
         plan = complete_plan(read_plan(path), params.defaults)
+        if not plan.rooms:
+            raise MapSenseError(f"{path}: the plan has no room; there is nothing to scan")
         return [Site(plan, storey_mesh(plan))]
     names = [storey] if storey is not None else list(ifc_storeys(path))
     sites = [_ifc_site(path, name, params) for name in names]
@@ -99,12 +102,19 @@ def simulate(
     ----------
     scans : int, optional
         Scans of all storeys together, shared by their numbers of rooms; None: one of each room.
+
+    Raises
+    ------
+    MapSenseError
+        If two storeys would lie in one folder.
     """
+    names = [_name_of(site.plan) for site in sites]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise MapSenseError(f"two plans are of storey '{twice[0]}': give each its own name")
     plans = tuple(site.plan for site in sites)
     each = shares(scans, plans) if scans is not None else tuple(len(p.rooms) for p in plans)
     storeys = []
-    for site, count in zip(sites, each, strict=True):
-        name = _name_of(site.plan)
+    for site, name, count in zip(sites, names, each, strict=True):
         truth = folder / name / "truth.geojson"
         write_plan(site.plan, truth)
         of_storey = params.model_copy(update={"scans": count}) if count else None
@@ -143,5 +153,5 @@ def _scans(
 
 def _name_of(plan: Plan) -> str:
     """Return a storey's name as one that can be a folder."""
-    name = "".join(c if c.isalnum() or c in "_.-" else "_" for c in plan.storey).strip(".-") or "0"
-    return check_name(name)
+    name = re.sub(r"\.{2,}", ".", re.sub(r"[^A-Za-z0-9_.-]+", "_", plan.storey))
+    return check_name(name.strip(".-")[:100] or "0")

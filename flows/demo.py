@@ -1,11 +1,12 @@
 """The demo: a small simulated storey, scanned, mapped, and compared with its truth."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from storage.plan import Plan
+from storage.plan import Plan, PlanRoom
 from storage.plan_geojson import write_plan
+from tasks.evaluation.rooms import ious, match
 from tasks.scans.bundle import write_bundle
 from tasks.simulation.campaign import CampaignParams, simulate_scans
 from tasks.simulation.plan import StoreyParams, make_storey
@@ -25,7 +26,7 @@ class RoomMatch:
     name: str
     truth_m2: float
     mapped_m2: float | None
-    """None if no mapped room overlaps it most"""
+    """None if it is matched with no mapped room"""
     iou: float
     """area of the intersection over that of the union; 0 if not mapped"""
 
@@ -39,14 +40,14 @@ def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> tuple[Plan
     truth = make_storey(StoreyParams(seed=seed), BUILDING, STOREY)
     write_plan(truth, folder / "truth.geojson")
     scans = []
-    for scan in simulate_scans(truth, _small_campaign(seed, len(truth.rooms) + AGAIN)):
+    for scan in simulate_scans(truth, small_campaign(seed, len(truth.rooms) + AGAIN)):
         scans.append(folder / "scans" / f"{scan.name}.scan")
         write_bundle(scans[-1], scan.cloud, scan.snapshots, frame="device")
         told(f"simulated scan {scan.name}: {len(scan.cloud):,} points")
     return truth, tuple(scans)
 
 
-def _small_campaign(seed: int, scans: int) -> CampaignParams:
+def small_campaign(seed: int, scans: int) -> CampaignParams:
     """Return scans by skilled volunteers, of fewer and sparser snapshots than Tango's."""
     return CampaignParams(
         seed=seed,
@@ -59,30 +60,18 @@ def _small_campaign(seed: int, scans: int) -> CampaignParams:
 
 
 def compare_rooms(truth: Plan, mapped: Plan) -> list[RoomMatch]:
-    """Match each true room with the mapped room that shares most area with it, each once."""
-    shared = sorted(
-        (
-            (true.polygon.intersection(found.polygon).area, i, j)
-            for i, true in enumerate(truth.rooms)
-            for j, found in enumerate(mapped.rooms)
-        ),
-        reverse=True,
-    )
-    partner: dict[int, tuple[int, float]] = {}
-    taken: set[int] = set()
-    for area, i, j in shared:
-        if area > 0 and i not in partner and j not in taken:
-            partner[i] = (j, area)
-            taken.add(j)
-    return [_match(truth, mapped, i, partner.get(i)) for i in range(len(truth.rooms))]
+    """Return what was mapped of each true room, matched one to one at the greatest IoU in all."""
+    overlap = ious([r.polygon for r in mapped.rooms], [r.polygon for r in truth.rooms])
+    return [
+        _missed(room) if j < 0 else _match(room, mapped.rooms[j], float(overlap[j, i]))
+        for i, (room, j) in enumerate(zip(truth.rooms, match(overlap), strict=True))
+    ]
 
 
-def _match(truth: Plan, mapped: Plan, i: int, partner: tuple[int, float] | None) -> RoomMatch:
-    room = truth.rooms[i]
-    area = room.polygon.area
-    if partner is None:
-        return RoomMatch(room.id, room.name or room.id, round(area, 2), None, 0.0)
-    j, shared = partner
-    found = mapped.rooms[j].polygon.area
-    iou = shared / (area + found - shared)
-    return RoomMatch(room.id, room.name or room.id, round(area, 2), round(found, 2), round(iou, 3))
+def _match(room: PlanRoom, found: PlanRoom, iou: float) -> RoomMatch:
+    mapped_m2 = round(found.polygon.area, 2)
+    return replace(_missed(room), mapped_m2=mapped_m2, iou=round(iou, 3))
+
+
+def _missed(room: PlanRoom) -> RoomMatch:
+    return RoomMatch(room.id, room.name or room.id, round(room.polygon.area, 2), None, 0.0)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from flows import progress, stages
 from flows.params import MapSenseParams
 from flows.storey import threads
 from storage.artifacts import Place, check_name, read
-from storage.campaign import Campaign, CampaignScan, read_campaign
+from storage.campaign import CampaignScan, CampaignStorey, read_campaign
+from storage.errors import InputError
+from storage.plan_geojson import read_plan
 from storage.quality import QUALITY
 from storage.room_errors import ROOM_ERRORS
-from storage.runs import Run, new_id, recorded
+from storage.runs import COMPLETED, PARTIAL, Run, new_id, recorded
 from storage.sources import Source
 from storage.streams import STREAMS
 from tasks.device.codec import CodecParams
@@ -27,6 +30,8 @@ from tasks.scans.sources import find_sources
 VERB = "energy"
 GRAMAP = CodecParams(profile="low")
 """GraMap compresses all points at the low profile."""
+PER_SCAN = 12
+"""Stages of one scan: its device side, its mapping alone, and the comparison with the truth."""
 WHOLE = "campaign"
 """Stands for a storey where all of them together are meant."""
 
@@ -62,7 +67,7 @@ def measure_energy(request: EnergyRequest) -> None:
     """Count each scan's work and bytes, map each alone, and charge the methods (Fig. 19)."""
     campaign = read_campaign(Path(request.folder))
     params = request.params
-    tallies = [row for storey in campaign.storeys for row in _storey(request, campaign, storey)]
+    tallies = [row for storey in campaign.storeys for row in _storey(request, storey)]
     place = request.place(WHOLE)
     with recorded(request.store, _run(request, WHOLE)) as record:
         work = stages.scan_work(place, params.work.model_copy(update={"scans": tuple(tallies)}))
@@ -70,7 +75,7 @@ def measure_energy(request: EnergyRequest) -> None:
         stages.savings(place, energy)
         stages.energy_sweep(place, work, params.energy, params.sweep)
         stages.energy_targets(place, work, params.energy, params.targets)
-        record.end("completed", "")
+        record.end(COMPLETED, "")
 
 
 def _run(request: EnergyRequest, storey: str) -> Run:
@@ -84,12 +89,12 @@ def _run(request: EnergyRequest, storey: str) -> Run:
     )
 
 
-def _storey(request: EnergyRequest, campaign: Campaign, storey: Any) -> list[Tally]:
+def _storey(request: EnergyRequest, storey: CampaignStorey) -> list[Tally]:
     """Return what was counted of each scan of a storey; one that cannot be read is left out."""
     folder = Path(request.folder)
     scans = {scan.scan: scan for scan in storey.scans}
     sources, errors = find_sources([folder / scan.path for scan in storey.scans])
-    truth = _truth(folder / storey.truth)
+    truth = _truth(folder, storey)
     place = request.place(storey.storey)
     progress.expect(place, PER_SCAN * len(sources))
     with recorded(request.store, _run(request, storey.storey)) as record:
@@ -99,11 +104,8 @@ def _storey(request: EnergyRequest, campaign: Campaign, storey: Any) -> list[Tal
             tally = _tally(request, storey.storey, scans[name], futures)
             tallies += [tally] if tally else []
             failed += [] if tally else [name]
-        record.end("partial" if failed else "completed", _left_out(failed))
+        record.end(PARTIAL if failed else COMPLETED, _left_out(failed))
     return tallies
-
-
-PER_SCAN = 12
 
 
 def _submit(
@@ -171,10 +173,13 @@ def _left_out(failed: Iterable[str]) -> str:
     return f"left out, their device side failed: {names}" if names else ""
 
 
-def _truth(path: Path) -> Source:
-    """Return the true plan as a stage's input."""
-    from hashlib import sha256
-
+def _truth(folder: Path, storey: CampaignStorey) -> Source:
+    """Return the true plan as a stage's input, once it is known to have every room asked for."""
+    path = folder / storey.truth
+    known = {room.id for room in read_plan(path).rooms}
+    if unknown := [scan for scan in storey.scans if scan.room not in known]:
+        problem = f"has no room '{unknown[0].room}', which scan '{unknown[0].scan}' is of"
+        raise InputError(path, problem, "simulate the campaign again")
     data = path.read_bytes()
     return Source(
         name="truth", path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data)

@@ -72,6 +72,9 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     """Return what is wrong with settings as one sentence, with a suggestion for a wrong name."""
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"])
+    if not first["loc"] and "error" in first.get("ctx", {}):
+        # several settings do not go together: the text says which
+        return f"settings: {first['ctx']['error']}"
     if first["type"] != "extra_forbidden":
         return f"setting '{where}' = {first['input']!r}: {first['msg'].lower()}"
     *parents, name = (str(part) for part in first["loc"])

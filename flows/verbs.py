@@ -106,6 +106,8 @@ def simulate_campaign(
 
     if bool(plans) == bool(preset):
         raise MapSenseError("name a plan (GeoJSON or IFC) to scan, or a --preset, and not both")
+    if scans is not None and scans < 1:
+        raise MapSenseError(f"--scans {scans}: expected at least 1")
     _check_name(building)
     given = _merged({"campaign": {"seed": seed}}, _assigned(assignments))
     try:
@@ -156,7 +158,7 @@ def charge_campaign(
     with prefect_api(root):
         from flows.energy import EnergyRequest
         from flows.params import parse_params
-        from flows.work import run_energy
+        from flows.work import left_out, run_energy
 
         request = EnergyRequest(
             store=str(root),
@@ -165,13 +167,16 @@ def charge_campaign(
             params=parse_params(settings.params),
         )
         answers = run_energy(request, settings.jobs, not as_json)
+        missing = left_out(request)
     if as_json:
         print(json.dumps({k: v.to_pylist() for k, v in answers.items()}, indent=1, default=str))
-        return 0
-    for title, table in answers.items():
-        print(f"\n{title}")
-        print_table(table)
-    return 0
+    else:
+        for title, table in answers.items():
+            print(f"\n{title}")
+            print_table(table)
+    for line in missing:
+        print(f"mapsense: {line}", file=sys.stderr)
+    return 1 if missing else 0
 
 
 def run_again(

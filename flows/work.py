@@ -60,6 +60,12 @@ def run_energy(request: EnergyRequest, jobs: int, show: bool) -> dict[str, pa.Ta
     return {title: _own(catalog.query(name), request) for title, name in ENERGY_ANSWERS.items()}
 
 
+def left_out(request: EnergyRequest) -> list[str]:
+    """Return for each storey of which scans were left out which ones."""
+    runs = [r for r in read_runs(request.store, request.building) if r.id == request.run]
+    return [f"{r.building}/{r.storey}: {r.message}" for r in runs if r.state != COMPLETED]
+
+
 def _own(answer: pa.Table, request: EnergyRequest) -> pa.Table:
     """Return the rows of one building; of the accumulated ones, those of one query a room."""
     rows = pc.equal(answer["building"], request.building)

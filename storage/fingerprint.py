@@ -41,7 +41,7 @@ ALWAYS = ("numpy", "scipy", "numba", "pyarrow", "shapely")
 
 
 _parsing = Lock()
-"""Before Python 3.11.5 two threads that parse at once can upset the parser's count of its depth:
+"""In Python 3.11 two threads that parse at once can upset the parser's count of its depth:
 SystemError, "AST constructor recursion depth mismatch" (CPython issue 106905)."""
 
 

@@ -12,8 +12,8 @@ from storage.artifacts import Kind, column, register, schema
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """n points of one scan, z up: point i lies at `origin + xyz[i]` in the building frame, or, before
-    registration, in the device frame of its snapshot."""
+    """n points of one scan in the building frame, z up: point i lies at `origin + xyz[i]`. Before
+    registration each lies in the device frame of its snapshot."""
 
     xyz: NDArray[np.float32]
     """(n, 3), metres, relative to `origin`"""

@@ -48,7 +48,7 @@ def served(prefect_server, monkeypatch):
     monkeypatch.setenv("PREFECT_API_URL", prefect_server)
 
 
-@pytest.mark.parametrize("verb", ["map", "demo", "query", "status", "rerun"])
+@pytest.mark.parametrize("verb", ["map", "demo", "simulate", "energy", "query", "status", "rerun"])
 def test_help_shows_an_example(mapsense, verb):
     code, out, _ = mapsense(verb, "--help")
     assert code == 0
@@ -99,7 +99,9 @@ def test_map_query_status_and_rerun(mapsense, served, cloud, tmp_path):
 def test_named_queries_are_listed_with_what_they_answer(mapsense):
     code, out, _ = mapsense("query")
     assert code == 0
-    for name in ("stage_times", "time_against_points", "failures", "cache_hits", "slowest"):
+    runs = ("stage_times", "time_against_points", "failures", "cache_hits", "slowest")
+    campaigns = ("energy_savings", "gate_curve", "quality_by_volunteer")
+    for name in (*runs, *campaigns):
         assert name in out
 
 
@@ -119,6 +121,19 @@ def test_named_queries_are_listed_with_what_they_answer(mapsense):
         (("map", "--building", "b", "--storey", "0"), "no scan named"),
         (("map", "missing", "--building", "b", "--storey", "0"),
          "b/0: none of 1 scans could be used: "),
+        (("map", "x", "--building", "b", "--storey", "0", "--set", "quality.t_q=1"),
+         "settings: quality.t_q and energy.t_q differ: set both"),
+        (("simulate", "--out", "c"), "name a plan (GeoJSON or IFC) to scan, or a --preset"),
+        (("simulate", "p.ifc", "--preset", "ring", "--out", "c"), "and not both"),
+        (("simulate", "--preset", "rng", "--out", "c"),
+         "preset 'rng': there are paper, ring, wing"),
+        (("simulate", "--preset", "ring", "--out", "c", "--set", "campaign.skil=1"),
+         "unknown setting 'campaign.skil': did you mean 'campaign.skill'"),
+        (("simulate", "--preset", "ring", "--out", "c", "--scans", "0"),
+         "--scans 0: expected at least 1"),
+        (("simulate", "missing.geojson", "--out", "c"), "missing.geojson: cannot be read"),
+        (("simulate", "missing.ifc", "--out", "c"), "missing.ifc: cannot be read"),
+        (("energy", "nowhere"), "nowhere/campaign.json: cannot be read (No such file"),
         (("status", "--store", "nowhere"), "nowhere: there is no store"),
         (("nonsense",), "Unknown command"),
     ],

@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 from shapely import box
 
-from flows.demo import compare_rooms
+from flows.demo import BUILDING, STOREY, compare_rooms, small_campaign
 from flows.initial_model import initial_plan
 from storage.plan import Plan, PlanRoom
 from storage.plan_geojson import read_plan, write_plan
 from storage.rooms import Rooms
 from storage.walls import Walls
+from tasks.device.quality import QualityParams, assess
+from tasks.simulation.campaign import simulate_scan
+from tasks.simulation.mesh import storey_mesh
+from tasks.simulation.plan import StoreyParams, make_storey
+from tasks.simulation.sensor import Scene
 
 
 def plan(*boxes):
@@ -29,7 +34,35 @@ def test_rooms_are_matched_by_what_they_share():
 def test_a_mapped_room_matches_one_room_only():
     first, second = compare_rooms(plan((0, 0, 4, 5), (4, 0, 6, 5)), plan((0, 0, 6, 5)))
     assert first.iou == pytest.approx(20 / 30, abs=1e-3)
-    assert second.mapped_m2 is None
+    assert (second.mapped_m2, second.iou) == (None, 0.0)
+
+
+def test_rooms_are_matched_at_the_greatest_iou_in_all_not_the_greatest_area_shared():
+    # the hall shares most, 30 m2, with the first mapped room; then the office would have none
+    truth = plan((0, 0, 10, 5), (-4, 0, 0, 5))
+    mapped = plan((-4, 0, 6, 5), (6, 0, 10, 5))
+    hall, office = compare_rooms(truth, mapped)
+    assert (hall.mapped_m2, hall.iou) == (20, 0.4)
+    assert (office.mapped_m2, office.iou) == (50, 0.4)
+
+
+def test_a_storey_of_which_nothing_was_mapped_has_only_missed_rooms():
+    (missed,) = compare_rooms(plan((0, 0, 4, 5)), plan())
+    assert missed.as_json() == {
+        "room": "r0",
+        "name": "Room 0",
+        "truth_m2": 20.0,
+        "mapped_m2": None,
+        "iou": 0.0,
+    }
+
+
+def test_the_demos_volunteers_pass_the_quality_gate():
+    truth = make_storey(StoreyParams(seed=0), BUILDING, STOREY)
+    scene = Scene(storey_mesh(truth))
+    for index in (0, len(truth.rooms)):
+        scan = simulate_scan(scene, truth, index, small_campaign(0, 2 * len(truth.rooms)))
+        assert assess(scan.snapshots, QualityParams()).accepted
 
 
 def test_a_plan_keeps_what_is_unknown_unknown(tmp_path):

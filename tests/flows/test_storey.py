@@ -1,6 +1,7 @@
 """The real storey flow on small simulated rooms, through Prefect's real engine."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,40 @@ from storage.plan_geojson import read_plan
 from storage.points import PointCloud
 from storage.rooms import Rooms
 from storage.runs import read_runs
-from storage.snapshots import none
+from storage.snapshots import Snapshots, none
 from tasks.scans.bundle import write_bundle
 from tasks.simulation.clouds import furnished_room
 from tasks.surfaces.intersection import IntersectParams
+
+PER_SCAN = (
+    *("clouds", "quality", "voxels", "streams"),
+    *("decoded", "planes", "segments", "occupancy"),
+)
+UPRIGHT = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+"""Rotation of a device held upright: a roll of 90 degrees."""
+ON_ITS_BACK = (1.0, 0.0, 0.0, 0.0)
+
+
+def asking_for(t_q):
+    """Return parameters that ask for a quality."""
+    return MapSenseParams.model_validate({"quality": {"t_q": t_q}, "energy": {"t_q": t_q}})
+
+
+def stages_of(scans, *names, **others):
+    """Return how often each stage runs: some of those of a scan, and others."""
+    return dict.fromkeys(names or PER_SCAN, scans) | others
+
+
+def posed(cloud, snapshots, rotation):
+    """Return a cloud as so many equal snapshots saw it from the room's middle, and those."""
+    each = np.sort(np.arange(len(cloud)) % snapshots).astype(np.int32)
+    poses = Snapshots(
+        np.arange(snapshots, dtype=float),
+        np.tile(np.median(cloud.xyz, axis=0), (snapshots, 1)),
+        np.tile(rotation, (snapshots, 1)),
+        np.bincount(each, minlength=snapshots),
+    )
+    return PointCloud(cloud.xyz, cloud.origin, each), poses
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +64,27 @@ def scans(tmp_path, clouds):
     for name, cloud in zip(("a", "b"), clouds, strict=True):
         write_bundle(folder / f"{name}.scan", cloud, none())
     return folder
+
+
+@pytest.fixture(scope="module")
+def first_store(prefect_server, tmp_path_factory, clouds):
+    """A store in which the storey was mapped once."""
+    from flows.storey import map_storey
+
+    folder = tmp_path_factory.mktemp("first")
+    for name, cloud in zip(("a", "b"), clouds, strict=True):
+        write_bundle(folder / "scans" / f"{name}.scan", cloud, none())
+    request = StoreyRequest(
+        store=str(folder / "store"), building="hut", storey="0", scans=(str(folder / "scans"),)
+    )
+    assert map_storey(request, return_state=True).is_completed()
+    return folder / "store"
+
+
+@pytest.fixture
+def mapped_before(first_store, tmp_path):
+    """A store of the test's own in which the storey was mapped once."""
+    shutil.copytree(first_store, tmp_path / "store")
 
 
 @pytest.fixture
@@ -63,10 +115,10 @@ def mapped(prefect_server, tmp_path, scans):
 
 def test_a_storey_is_mapped_and_an_unchanged_rerun_computes_nothing(mapped, tmp_path):
     state, summary, counts = mapped()
-    every = {"clouds": 2, "planes": 2, "segments": 2, "occupancy": 2, "faces": 1, "rooms": 1}
+    every = stages_of(2, faces=1, rooms=1)
     assert state.is_completed()
     assert counts == {"computed": every, "cached": {}, "failed": {}}
-    assert (summary["state"], summary["skipped"]) == ("completed", [])
+    assert (summary["state"], summary["skipped"], summary["rejected"]) == ("completed", [], [])
     assert [scan["scan"] for scan in summary["used"]["scans"]] == ["a", "b"]
     assert summary["used"]["points"] == 60_000
     assert summary["found"]["rooms"] == 1
@@ -85,15 +137,40 @@ def test_a_storey_is_mapped_and_an_unchanged_rerun_computes_nothing(mapped, tmp_
     assert again["found"] == summary["found"]
 
 
-def test_a_changed_parameter_recomputes_its_stage_and_what_follows(mapped):
-    mapped()
+def test_a_changed_parameter_recomputes_its_stage_and_what_follows(mapped_before, mapped):
     params = MapSenseParams.model_validate({"filter": {"cell_m": 0.12}})
     _, _, counts = mapped(params=params)
     assert counts["computed"] == {"segments": 2, "faces": 1, "rooms": 1}
-    assert counts["cached"] == {"clouds": 2, "planes": 2, "occupancy": 2}
+    assert counts["cached"] == stages_of(2, *(s for s in PER_SCAN if s != "segments"))
 
 
-def test_a_broken_scan_is_skipped_with_its_reason_and_made_up_for_later(mapped, scans, clouds):
+def test_the_server_works_on_what_was_decoded(mapped_before, mapped, tmp_path):
+    params = MapSenseParams.model_validate({"codec": {"profile": "medium"}})
+    _, _, counts = mapped(params=params)
+    assert counts["cached"] == stages_of(2, "clouds", "quality", "voxels")
+    changed = ("streams", "decoded", "planes", "segments", "occupancy")
+    assert counts["computed"] == stages_of(2, *changed, faces=1, rooms=1)
+    rows = run_query(
+        tmp_path / "store",
+        "select s.stage, s.points_in, s.points_out, t.cells, t.points "
+        "from stages s join streams_all t using (scan) "
+        "where t.profile = 'medium' and s.outcome = 'computed' "
+        "and s.run = (select max(id) from runs)",
+    ).to_pylist()
+    assert len(rows) == 10
+    for row in rows:
+        assert 0 < row["cells"] <= row["points"] < 30_000
+        if row["stage"] == "streams":
+            assert row["points_in"] == row["points"]
+        elif row["stage"] == "decoded":
+            assert row["points_out"] == row["cells"]
+        else:
+            assert row["points_in"] == row["cells"]
+
+
+def test_a_broken_scan_is_skipped_with_its_reason_and_made_up_for_later(
+    mapped, scans, clouds, tmp_path
+):
     points = scans / "b.scan" / "points.parquet"
     points.write_bytes(b"no Parquet")
     state, summary, counts = mapped()
@@ -102,24 +179,67 @@ def test_a_broken_scan_is_skipped_with_its_reason_and_made_up_for_later(mapped, 
     assert [skipped["scan"] for skipped in summary["skipped"]] == ["b"]
     assert "points.parquet" in summary["skipped"][0]["reason"]
     assert counts["failed"] == {"clouds": 1}
+    assert "made from 1 of 2 scans" in read_plan(tmp_path / "out" / "plan.geojson").notes
     write_bundle(scans / "b.scan", clouds[1], none())
     _, summary, counts = mapped()
     assert summary["state"] == "completed"
-    assert counts["computed"] == {
-        "clouds": 1,
-        "planes": 1,
-        "segments": 1,
-        "occupancy": 1,
-        "faces": 1,
-        "rooms": 1,
+    assert counts["computed"] == stages_of(1, faces=1, rooms=1)
+    assert counts["cached"] == stages_of(1)
+
+
+def test_the_quality_gate_keeps_back_what_is_sparse_or_skewed(mapped, tmp_path, clouds):
+    scans = {
+        "good": posed(clouds[0], 3, UPRIGHT),
+        "skewed": posed(clouds[1], 3, ON_ITS_BACK),
+        "sparse": posed(clouds[1], 10, UPRIGHT),
     }
-    assert counts["cached"] == {"clouds": 1, "planes": 1, "segments": 1, "occupancy": 1}
+    for name, (cloud, snapshots) in scans.items():
+        write_bundle(tmp_path / "gated" / f"{name}.scan", cloud, snapshots)
+    asked = {"scans": (str(tmp_path / "gated"),)}
+    _, summary, counts = mapped(params=asking_for(0.5), **asked)
+    assert summary["state"] == "completed"
+    assert summary["message"] == "2 of 3 scans rejected by the quality gate"
+    assert summary["skipped"] == []
+    assert [(r["scan"], r["reason"].partition(" (")[0]) for r in summary["rejected"]] == [
+        # Eq. 2 at 90 of sigma's 30 degrees: 1 - exp(-9 / 2)
+        ("skewed", "rejected on the device: P_sum 0.99 > T_q 0.50, skewed"),
+        ("sparse", "rejected on the device: P_sum 1.00 > T_q 0.50, incomplete"),
+    ]
+    (used,) = summary["used"]["scans"]
+    assert (used["scan"], used["p_in"], used["p_sk"], used["p_sum"]) == ("good", 0, 0, 0)
+    assert counts["computed"] == stages_of(1, clouds=3, quality=3, faces=1, rooms=1)
+    plan = read_plan(tmp_path / "out" / "plan.geojson")
+    assert [room.scans for room in plan.rooms] == [("good",)]
+    assert "made from 1 of 3 scans" in plan.notes
+
+    _, summary, counts = mapped(params=asking_for(1.0), **asked)
+    assert (summary["state"], summary["message"], summary["rejected"]) == ("completed", "", [])
+    assert [s["scan"] for s in summary["used"]["scans"]] == ["good", "skewed", "sparse"]
+    assert [round(s["p_sum"], 3) for s in summary["used"]["scans"]] == [0, 0.989, 1]
+    assert counts["computed"] == stages_of(2, *PER_SCAN[2:], quality=3, faces=1, rooms=1)
+    assert counts["cached"] == stages_of(1, *PER_SCAN[2:], clouds=3)
 
 
-def test_a_plan_of_some_of_the_scans_says_so(mapped, scans, tmp_path):
-    (scans / "b.scan" / "points.parquet").write_bytes(b"no Parquet")
-    mapped()
-    assert "made from 1 of 2 scans" in read_plan(tmp_path / "out" / "plan.geojson").notes
+def test_a_storey_whose_scans_are_all_rejected_fails_with_the_reasons(mapped, tmp_path, clouds):
+    write_bundle(tmp_path / "gated" / "sparse.scan", *posed(clouds[0], 10, UPRIGHT))
+    state, summary, counts = mapped(scans=(str(tmp_path / "gated"),), params=asking_for(0.5))
+    assert state.is_failed()
+    assert state.message.startswith(
+        "none of 1 scans could be used: sparse: rejected on the device: P_sum 1.00 > T_q 0.50"
+    )
+    assert (summary["state"], summary["found"]) == ("failed", None)
+    assert [skipped["scan"] for skipped in summary["skipped"]] == ["sparse"]
+    assert counts == {"computed": {"clouds": 1, "quality": 1}, "cached": {}, "failed": {}}
+
+
+def test_a_cloud_without_poses_is_not_assessed_and_used(mapped, tmp_path, clouds):
+    write_bundle(tmp_path / "gated" / "b.scan", clouds[1], none())
+    _, summary, _ = mapped(scans=(str(tmp_path / "gated"),), params=asking_for(0.0))
+    assert summary["state"] == "completed"
+    (used,) = summary["used"]["scans"]
+    assert (used["scan"], used["p_in"], used["p_sk"], used["p_sum"]) == ("b", None, None, None)
+    (row,) = run_query(tmp_path / "store", "quality").to_pylist()
+    assert (row["scan"], row["accepted"], row["reason"]) == ("b", None, "not assessed")
 
 
 def test_a_storey_without_a_usable_scan_fails_with_the_reasons(mapped, scans, tmp_path):
@@ -134,16 +254,18 @@ def test_a_storey_without_a_usable_scan_fails_with_the_reasons(mapped, scans, tm
     assert run.ended_at is not None
 
 
-def test_the_catalog_shows_the_last_successful_run(mapped, scans, tmp_path):
-    mapped()
+def test_the_catalog_shows_the_last_successful_run(mapped_before, mapped, scans, tmp_path):
     store = tmp_path / "store"
     params = MapSenseParams.model_validate({"hough": {"seed": 3}})
     mapped(params=params)
     for name in ("a", "b"):
         (scans / f"{name}.scan" / "points.parquet").write_bytes(b"no Parquet")
     mapped()
-    count = "select (select count(*) from plane_labels) as now, (select count(*) from points_all)"
-    assert run_query(store, count).to_pylist()[0]["now"] == 60_000
+    count = "select count(*) as n, (select sum(cells) from streams) as decoded from "
+    (now,) = run_query(store, count + "plane_labels").to_pylist()
+    assert now["n"] == now["decoded"] > 0
+    (ever,) = run_query(store, count + "plane_labels_all").to_pylist()
+    assert ever["n"] == 2 * now["n"]
     hits = run_query(store, "cache_hits").to_pylist()
     assert [hit["state"] for hit in hits] == ["failed", "completed", "completed"]
 

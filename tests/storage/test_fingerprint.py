@@ -107,7 +107,7 @@ def test_an_upgraded_library_counts(lab, monkeypatch):
 
 
 def test_threads_that_ask_at_once_get_the_same_answer():
-    # Python before 3.11.5 fails where two threads parse at the same time
+    # Python 3.11 may fail where two threads parse at the same time
     functions = [intersect_walls, detect_planes, read_scan, label_surfaces]
     expected = [code_fingerprint(function) for function in functions]
     for _ in range(3):

@@ -294,7 +294,7 @@ def test_a_point_whose_snapshot_is_unknown_was_seen_from_the_nearest_one():
         plane = Planes(
             np.array([normal]), np.zeros(1), np.array([len(xyz)]), np.zeros(1), np.zeros(3)
         )
-        for shift in (0.0, 100.0):
+        for shift in (0.0, 100.0, -100.0):
             origin = np.array([shift, 0, 0])
             moved = Snapshots(poses.times, places + origin, poses.rotations, counts)
             cloud = PointCloud(xyz, origin)
