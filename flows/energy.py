@@ -152,6 +152,7 @@ def _tally(
         room=scan.room,
         scan=scan.scan,
         volunteer=scan.volunteer,
+        skill=scan.skill,
         duration_s=scan.duration_s,
         raw_points=scan.points,
         voxel_points=stream.points,

@@ -26,6 +26,8 @@ class ScanWork:
     """(s,), name of the scan"""
     volunteers: NDArray[np.str_]
     """(s,), who scanned"""
+    skills: NDArray[np.float64]
+    """(s,), the volunteer's skill in this scan, 0 to 1; NaN: a real one, nobody knows"""
     duration_s: NDArray[np.float64]
     """(s,), seconds from the first to the last snapshot"""
     raw_points: NDArray[np.int64]
@@ -54,6 +56,7 @@ _COLUMNS = {
     "rooms": column("room", pa.string(), "room asked for"),
     "scans": column("scan", pa.string(), "name of the scan"),
     "volunteers": column("volunteer", pa.string(), "who scanned"),
+    "skills": column("skill", pa.float64(), "simulated skill; null: unknown", nullable=True),
     "duration_s": column("duration_s", pa.float64(), "time from first to last snapshot"),
     "raw_points": column("raw_points", pa.int64(), "points captured"),
     "voxel_points": column("voxel_points", pa.int64(), "points left by the voxel grid"),

@@ -1,5 +1,6 @@
 -- the quality gate by volunteer: scans assessed and accepted, and how many were of use
 select q.building, q.storey, w.volunteer,
+       round(avg(w.skill), 2) as skill,
        count(*) as scans,
        count(q.accepted) as assessed,
        count(*) filter (q.accepted) as accepted,

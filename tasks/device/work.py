@@ -21,6 +21,8 @@ class Tally(Params):
     """Name of the scan."""
     volunteer: str
     """Who scanned."""
+    skill: float | None = None
+    """Simulated skill of the volunteer in this scan, 0 to 1; None: unknown."""
     duration_s: NonNegativeFloat
     """From the first to the last snapshot, seconds."""
     raw_points: NonNegativeInt
@@ -61,6 +63,7 @@ def tally_work(params: WorkParams) -> ScanWork:
         rooms=np.array([row.room for row in rows], np.str_),
         scans=np.array([row.scan for row in rows], np.str_),
         volunteers=np.array([row.volunteer for row in rows], np.str_),
+        skills=np.array([np.nan if row.skill is None else row.skill for row in rows], float),
         duration_s=np.array([row.duration_s for row in rows], float),
         p_sum=np.array([np.nan if row.p_sum is None else row.p_sum for row in rows], float),
         bytes_raw=RAW_BYTES * whole["raw_points"],

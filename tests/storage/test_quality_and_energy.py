@@ -30,7 +30,8 @@ WHOLE = {
     "n_queries", "seeds", "captures", "rejected", "uploads", "unanswered", "n_seeds",
 }  # fmt: skip
 NULLABLE = {
-    "p_sum", "low", "high", "second_values", "needed", "savings", "best_values", "best_savings",
+    "p_sum", "skills", "low", "high", "second_values", "needed", "savings", "best_values",
+    "best_savings",
 }  # fmt: skip
 NOT_MEASURED = (Energy, Savings, EnergySweep, EnergyTargets)
 

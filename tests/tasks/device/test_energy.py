@@ -32,6 +32,7 @@ def recordings(rooms="a", storeys="0", **columns):
     s = len(rooms)
     alike = {
         "duration_s": 20.0,
+        "skills": np.nan,
         "raw_points": 1_000_000,
         "voxel_points": 100_000,
         "snapshots": 40,

@@ -20,6 +20,7 @@ FREE_CPU = PARAMS.model_copy(update={"cpu_w": 0.0})
 def recordings(s=8, **columns):
     """Return s recordings of s rooms of one storey: the first of each is of use."""
     alike = {
+        "skills": np.nan,
         "duration_s": DURATION_S,
         "raw_points": 1_000_000,
         "voxel_points": 100_000,
