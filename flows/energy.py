@@ -14,7 +14,7 @@ from flows import progress, stages
 from flows.params import MapSenseParams
 from flows.storey import threads
 from storage.artifacts import Place, check_name, read
-from storage.campaign import CampaignScan, CampaignStorey, read_campaign
+from storage.campaign import FILE, CampaignScan, CampaignStorey, read_campaign
 from storage.errors import InputError
 from storage.plan_geojson import read_plan
 from storage.quality import QUALITY
@@ -67,6 +67,9 @@ def measure_energy(request: EnergyRequest) -> None:
     """Count each scan's work and bytes, map each alone, and charge the methods (Fig. 19)."""
     campaign = read_campaign(Path(request.folder))
     params = request.params
+    if WHOLE in {storey.storey for storey in campaign.storeys}:
+        problem = f"a storey is called '{WHOLE}', which stands for all of them"
+        raise InputError(Path(request.folder) / FILE, problem, "give the storey another name")
     tallies = [row for storey in campaign.storeys for row in _storey(request, storey)]
     place = request.place(WHOLE)
     with recorded(request.store, _run(request, WHOLE)) as record:

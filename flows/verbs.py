@@ -109,7 +109,10 @@ def simulate_campaign(
     if scans is not None and scans < 1:
         raise MapSenseError(f"--scans {scans}: expected at least 1")
     _check_name(building)
-    given = _merged({"campaign": {"seed": seed}}, _assigned(assignments))
+    assigned = _assigned(assignments)
+    for name in {"scans", "seed"} & set(assigned.get("campaign", {})):
+        raise MapSenseError(f"--set campaign.{name}: give it as --{name}")
+    given = _merged({"campaign": {"seed": seed}}, assigned)
     try:
         params = campaign.SimulationParams.model_validate(given)
     except ValidationError as error:

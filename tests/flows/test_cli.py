@@ -127,6 +127,8 @@ def test_named_queries_are_listed_with_what_they_answer(mapsense):
         (("simulate", "p.ifc", "--preset", "ring", "--out", "c"), "and not both"),
         (("simulate", "--preset", "rng", "--out", "c"),
          "preset 'rng': there are paper, ring, wing"),
+        (("simulate", "--preset", "ring", "--out", "c", "--set", "campaign.scans=9"),
+         "--set campaign.scans: give it as --scans"),
         (("simulate", "--preset", "ring", "--out", "c", "--set", "campaign.skil=1"),
          "unknown setting 'campaign.skil': did you mean 'campaign.skill'"),
         (("simulate", "--preset", "ring", "--out", "c", "--scans", "0"),
