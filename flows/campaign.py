@@ -135,7 +135,7 @@ def _scans(
     for index in range(params.scans or 0):
         scan = simulate_scan(scene, site.plan, index, params)
         path = folder / storey / "scans" / f"{scan.name}.scan"
-        write_bundle(path, scan.cloud, scan.snapshots, frame="device")
+        write_bundle(path, scan.cloud, scan.snapshots, frame="device", simulated=True)
         made.append(
             CampaignScan(
                 scan=scan.name,

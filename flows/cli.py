@@ -185,6 +185,33 @@ def energy(
 
 
 @app.command
+def evaluate(
+    plan: Annotated[Path, Parameter(help="The mapped plan, GeoJSON.")],
+    /,
+    *,
+    truth: Annotated[Path, Parameter(help="The true plan, GeoJSON, in the same frame.")],
+    building: Annotated[str | None, Parameter(help="Building. [default: the plan's]")] = None,
+    storey: Annotated[str | None, Parameter(help="Storey. [default: the plan's]")] = None,
+    store: Store = None,
+    set_: Set = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Score a mapped plan: rooms, corners, walls, doors, windows, furniture. Nothing is aligned.
+
+    For example
+
+    ```
+    mapsense evaluate ring/plan.geojson --truth campaign/ring/truth.geojson
+    ```
+    """
+    from flows.verbs import evaluate_plan
+
+    return evaluate_plan(plan, truth, building, storey, store, set_ or [], json)
+
+
+@app.command
 def query(
     what: Annotated[str | None, Parameter(help="Name of a query, or SQL.")] = None,
     /,

@@ -42,7 +42,7 @@ def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> tuple[Plan
     scans = []
     for scan in simulate_scans(truth, small_campaign(seed, len(truth.rooms) + AGAIN)):
         scans.append(folder / "scans" / f"{scan.name}.scan")
-        write_bundle(scans[-1], scan.cloud, scan.snapshots, frame="device")
+        write_bundle(scans[-1], scan.cloud, scan.snapshots, frame="device", simulated=True)
         told(f"simulated scan {scan.name}: {len(scan.cloud):,} points")
     return truth, tuple(scans)
 

@@ -14,6 +14,8 @@ from tasks.device.sweep import SweepParams
 from tasks.device.targets import TargetParams
 from tasks.device.voxels import VoxelParams
 from tasks.device.work import WorkParams
+from tasks.evaluation.detections import EvaluationParams
+from tasks.evaluation.walls import WallQualityParams
 from tasks.params import Params
 from tasks.scans.read import ReadParams
 from tasks.surfaces.filtering import FilterParams
@@ -52,6 +54,10 @@ class MapSenseParams(Params):
     """Its sensitivity."""
     targets: TargetParams = TargetParams()
     """The savings wanted."""
+    evaluation: EvaluationParams = EvaluationParams()
+    """When an object is found (Sec. 7.3)."""
+    wall_quality: WallQualityParams = WallQualityParams()
+    """Completeness, correctness and accuracy of walls."""
 
     @model_validator(mode="after")
     def _asks_for_one_quality(self) -> "MapSenseParams":

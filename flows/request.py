@@ -26,8 +26,6 @@ class StoreyRequest(BaseModel):
     """Parameters of the stages."""
     out: str | None = None
     """Folder of the results; None: in the store."""
-    simulated: bool = False
-    """Whether the scans are simulated: the plan and its drawing say so."""
     verb: str = "map"
     """What asked for the run."""
     run: str = Field(default_factory=new_id)

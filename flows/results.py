@@ -66,7 +66,7 @@ def summarise(
         "storey": request.storey,
         "state": _state(mapped, skipped),
         "message": message,
-        "simulated": request.simulated,
+        "simulated": mapped is not None and mapped.plan.simulated,
         "run": request.run,
         "used": {
             "scans": [_scan(*s) for s in zip(mapped.scans, mapped.quality, strict=True)]

@@ -8,7 +8,9 @@ from tasks.device.sweep import sweep
 from tasks.device.targets import solve_targets
 from tasks.device.voxels import voxel_grid
 from tasks.device.work import tally_work
+from tasks.evaluation.detections import evaluate_plans
 from tasks.evaluation.rooms import room_errors as compare_rooms
+from tasks.evaluation.walls import evaluate_walls
 from tasks.scans.read import read_scan
 from tasks.stage.declare import stage
 from tasks.surfaces.filtering import extract_segments
@@ -29,6 +31,8 @@ faces = stage(label_surfaces, name="faces")
 rooms = stage(intersect_walls, name="rooms")
 
 room_errors = stage(compare_rooms, name="room_errors")
+detections = stage(evaluate_plans, name="detections")
+wall_quality = stage(evaluate_walls, name="wall_quality")
 scan_work = stage(tally_work, name="scan_work")
 energy = stage(simulate_energy, name="energy")
 savings = stage(average_savings, name="savings")

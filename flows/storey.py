@@ -119,7 +119,7 @@ def _map(request: StoreyRequest, sources: list[Source], skipped: list[Skipped]) 
     for n in used:
         made += [*sent[n].result(), quality[n].result(), streams[n].result()]
         made += [*planes[n].result(), segments[n].result()]
-    return _mapped(request, used, made, _notes(request, used, skipped, rejected), rejected)
+    return _mapped(request, used, made, skipped, rejected)
 
 
 def _rejected(request: StoreyRequest, rated: dict[str, Ref]) -> dict[str, str]:
@@ -149,40 +149,35 @@ def _mapped(
     request: StoreyRequest,
     used: list[str],
     made: list[Ref],
-    notes: list[str],
+    skipped: list[Skipped],
     rejected: dict[str, str],
 ) -> Mapped:
     refs: dict[str, list[Ref]] = {}
     for ref in made:
         refs.setdefault(ref.table, []).append(ref)
     store = request.store
+    scans = tuple(read(SCANS, ref, store) for ref in refs["scans"])
+    simulated = any(scan.simulated for scan in scans)
+    notes = ["made from simulated scans"] if simulated else []
+    if skipped or rejected:
+        notes.append(f"made from {len(used)} of {len(used) + len(skipped) + len(rejected)} scans")
     plan = initial_plan(
         request.building,
         request.storey,
         read(ROOMS, refs["rooms"][0], store),
         read(WALLS, refs["walls"][0], store),
         used,
-        simulated=request.simulated,
+        simulated=simulated,
         notes=notes,
     )
     return Mapped(
         plan,
         read(COVERAGE, refs["coverage"][0], store),
-        tuple(read(SCANS, ref, store) for ref in refs["scans"]),
+        scans,
         tuple(read(QUALITY, ref, store) for ref in refs["quality"]),
         tuple(Skipped(scan, why) for scan, why in rejected.items()),
         {table: sum(ref.rows for ref in of_table) for table, of_table in refs.items()},
     )
-
-
-def _notes(
-    request: StoreyRequest, used: list[str], skipped: list[Skipped], rejected: dict[str, str]
-) -> list[str]:
-    notes = ["made from simulated scans"] if request.simulated else []
-    if skipped or rejected:
-        asked = len(used) + len(skipped) + len(rejected)
-        notes.append(f"made from {len(used)} of {asked} scans")
-    return notes
 
 
 def _message(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:

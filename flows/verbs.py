@@ -72,7 +72,6 @@ def run_demo(out: Path, store: Path | None, seed: int, jobs: int | None, as_json
             scans=tuple(str(scan) for scan in scans),
             params=parse_params(settings.params),
             out=str(out),
-            simulated=True,
             verb="demo",
         )
         summary = run_storey(request, settings.jobs, not as_json)
@@ -139,6 +138,47 @@ def simulate_campaign(
     )
     for each in made.storeys:
         print(f"{out / each.storey}: scans/, truth.geojson")
+    return 0
+
+
+def evaluate_plan(
+    plan: Path,
+    truth: Path,
+    building: str | None,
+    storey: str | None,
+    store: Path | None,
+    assignments: list[str],
+    as_json: bool,
+) -> int:
+    """Score a mapped plan against the truth."""
+    settings = load_settings(store=store, params=_assigned(assignments) or None)
+    root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
+    from storage.plan_geojson import read_plan
+
+    mapped = read_plan(plan)
+    name, level = building or mapped.building, storey or mapped.storey
+    for each in (name, level):
+        _check_name(each)
+    with prefect_api(root):
+        from flows.evaluation import EvaluationRequest
+        from flows.params import parse_params
+        from flows.work import run_evaluation
+
+        request = EvaluationRequest(
+            store=str(root),
+            building=name,
+            storey=level,
+            plan=str(plan.resolve()),
+            truth=str(truth.resolve()),
+            params=parse_params(settings.params),
+        )
+        answers = run_evaluation(request, not as_json)
+    if as_json:
+        print(json.dumps({k: v.to_pylist() for k, v in answers.items()}, indent=1, default=str))
+        return 0
+    for title, table in answers.items():
+        print(f"\n{name}/{level}: {title}")
+        print_table(table)
     return 0
 
 

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from flows import progress
 from flows.building import map_building, with_jobs
 from flows.energy import EnergyRequest, measure_energy
+from flows.evaluation import EvaluationRequest, evaluate_storey
 from flows.request import StoreyRequest
 from flows.server import wait_until_up
 from flows.storey import threads
@@ -27,6 +28,13 @@ ENERGY_ANSWERS = {
     "the quality gate over T_q": "gate_curve",
 }
 """The named queries that answer what a campaign costs, by title."""
+
+SCORES = {
+    "area of rooms": "area_error",
+    "found and true": "recall_precision",
+    "faces of walls": "wall_quality",
+}
+"""The named queries that answer how good a plan is, by title."""
 
 
 def run_storey(request: StoreyRequest, jobs: int, show: bool) -> dict[str, Any]:
@@ -64,6 +72,28 @@ def left_out(request: EnergyRequest) -> list[str]:
     """Return for each storey of which scans were left out which ones."""
     runs = [r for r in read_runs(request.store, request.building) if r.id == request.run]
     return [f"{r.building}/{r.storey}: {r.message}" for r in runs if r.state != COMPLETED]
+
+
+def run_evaluation(request: EvaluationRequest, show: bool) -> dict[str, pa.Table]:
+    """Score a plan against its truth; return the answers people ask for, by title."""
+    with _engine(show):
+        state = evaluate_storey(request, return_state=True)
+    if not state.is_completed():
+        error = state.result(raise_on_failure=False)
+        if isinstance(error, Exception):
+            raise error
+        raise MapSenseError(f"{request.building}/{request.storey}: {state.message}")
+    catalog = Catalog(request.store)
+    answers = {}
+    for title, name in SCORES.items():
+        answer = catalog.query(name)
+        rows = pc.and_(
+            pc.equal(answer["building"], request.building),
+            pc.equal(answer["storey"], request.storey),
+        )
+        shown = [c for c in answer.column_names if c not in ("building", "storey", "scan")]
+        answers[title] = answer.filter(rows).select(shown)
+    return answers
 
 
 def _own(answer: pa.Table, request: EnergyRequest) -> pa.Table:

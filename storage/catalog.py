@@ -2,8 +2,9 @@
 
 The Parquet files are the truth; nothing is kept here that could be lost or locked, so any number
 of readers may ask while flows write. A view of a stored thing (`planes`, `rooms`, ...) shows what
-the last successful run of each storey made or took from the cache; the same name with `_all` shows
-every artifact there is. `runs` and `stages` are histories and show everything.
+the last successful run of each storey, and the last evaluation of it, made or took from the cache;
+the same name with `_all` shows every artifact there is. `runs` and `stages` are histories and show
+everything.
 """
 
 import importlib
@@ -33,7 +34,9 @@ HISTORIES = {"runs": runs.SCHEMA, "stages": stages.SCHEMA}
 CURRENT = """
 with last as (
   select id from runs where list_contains($mapped, state)
-  qualify row_number() over (partition by building, storey order by started_at desc, id desc) = 1
+  qualify row_number() over (
+    partition by building, storey, verb = $evaluate order by started_at desc, id desc
+  ) = 1
 )
 select distinct unnest(outputs) from stages join last on stages.run = last.id
 """
@@ -95,7 +98,8 @@ class Catalog:
 
     def _current(self) -> set[str]:
         """Return the artifacts of each storey's last successful run."""
-        rows = self._connection.sql(CURRENT, params={"mapped": list(runs.MAPPED)}).fetchall()
+        params = {"mapped": list(runs.MAPPED), "evaluate": runs.EVALUATE}
+        rows = self._connection.sql(CURRENT, params=params).fetchall()
         return {uri for (uri,) in rows}
 
     def _dataset(self, table: str, schema: pa.Schema, only: set[str] | None) -> ds.Dataset:

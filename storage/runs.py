@@ -19,6 +19,8 @@ from storage.errors import StoreError
 from storage.stages import reason
 
 RUNNING, COMPLETED, PARTIAL, FAILED = "running", "completed", "partial", "failed"
+EVALUATE = "evaluate"
+"""The verb of runs that measure what others made: they are no news of the storey's mapping."""
 MAPPED = (COMPLETED, PARTIAL)
 """States that left a plan; of a partial run some scans were skipped."""
 
@@ -130,8 +132,8 @@ def read_runs(
 
 
 def last_runs(runs: list[Run]) -> list[Run]:
-    """Return the last run of each storey, by building and storey."""
-    last = {(run.building, run.storey): run for run in runs}
+    """Return the last run of each storey that made something, by building and storey."""
+    last = {(run.building, run.storey): run for run in runs if run.verb != EVALUATE}
     return [last[key] for key in sorted(last)]
 
 

@@ -30,6 +30,8 @@ class Scan:
     scale: float
     """metres per unit of the file"""
     scale_guessed: bool
+    simulated: bool
+    """whether the bundle says that nobody ever made the scan"""
     notes: str
     """what a person should know: guesses and their reasons, gaps in the poses; '' if nothing"""
 
@@ -48,6 +50,7 @@ SCHEMA = schema(
         column("up_guessed", pa.bool_(), "the up axis was not set but certain from the cloud"),
         column("scale", pa.float64(), "metres per unit of the file"),
         column("scale_guessed", pa.bool_(), "the unit was not set but certain from the cloud"),
+        column("simulated", pa.bool_(), "the bundle says that it was simulated"),
         column("notes", pa.string(), "guesses and their reasons, gaps in the poses"),
     ],
 )

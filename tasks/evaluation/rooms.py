@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 from shapely import Polygon
 
 from storage.errors import MapSenseError
@@ -14,6 +13,7 @@ from storage.plan_geojson import read_plan
 from storage.room_errors import RoomErrors
 from storage.rooms import Rooms
 from storage.sources import Source
+from tasks.evaluation.matching import Pairs, most_overlapping, overlapping
 from tasks.params import Params
 
 
@@ -57,13 +57,10 @@ def room_errors(rooms: Rooms, truth: Source, params: EvaluateParams) -> RoomErro
 
 def ious(found: Sequence[Polygon], true: Sequence[Polygon]) -> NDArray[np.float64]:
     """Return the intersection over union of every pair, (f, t)."""
-    a = np.array(found, object).reshape(-1, 1)
-    b = np.array(true, object).reshape(1, -1)
-    if not a.size or not b.size:
-        return np.zeros((a.size, b.size))
-    both = shapely.area(shapely.intersection(a, b))
-    either = shapely.area(a) + shapely.area(b) - both
-    return both / np.maximum(either, 1e-12)
+    pairs = overlapping(found, true)
+    values = np.zeros((len(found), len(true)))
+    values[pairs.found, pairs.true] = pairs.values
+    return values
 
 
 def match(overlap: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -72,7 +69,7 @@ def match(overlap: NDArray[np.float64]) -> NDArray[np.int64]:
     Pairs that do not overlap are none.
     """
     partner = np.full(overlap.shape[1], -1)
-    rows, columns = linear_sum_assignment(-overlap)
-    touching = overlap[rows, columns] > 0
-    partner[columns[touching]] = rows[touching]
+    i, j = np.nonzero(overlap)
+    taken = most_overlapping(Pairs(i, j, overlap[i, j]), 0)
+    partner[taken.true] = taken.found
     return partner

@@ -36,6 +36,7 @@ PointsFrame = Literal["building", "device"]
 """The frame of a bundle's points: registered already, or still each snapshot's own."""
 
 _FRAME = b"mapsense.frame"
+_SIMULATED = b"mapsense.simulated"
 _UNIT = 1e-3  # rounding of a stored quaternion; more is a mistake of the writer
 
 
@@ -48,15 +49,21 @@ def read_bundle(folder: Path) -> RawCloud:
     _check_origin(points, table)
     _check_nulls(points, table)
     frame = _frame(points, table)
+    simulated = (table.schema.metadata or {}).get(_SIMULATED) == b"true"
     cloud = POINTS.from_table(table)
     del table
     _check_links(points, cloud, poses)
     chunks = _chunks(cloud) if frame == "building" else _registered(points, cloud, poses)
-    return RawCloud(chunks, len(cloud), poses=poses, convention=METRES_Z_UP)
+    return RawCloud(chunks, len(cloud), poses=poses, convention=METRES_Z_UP, simulated=simulated)
 
 
 def write_bundle(
-    folder: Path, cloud: PointCloud, snapshots: Snapshots, frame: PointsFrame = "building"
+    folder: Path,
+    cloud: PointCloud,
+    snapshots: Snapshots,
+    frame: PointsFrame = "building",
+    *,
+    simulated: bool = False,
 ) -> None:
     """Write a scan bundle: a reader sees all of it, the one before it, or nothing.
 
@@ -69,6 +76,8 @@ def write_bundle(
         Of 0 rows if the cloud has none.
     frame : "building" or "device"
         Whether the points are registered, or in the device frame of their snapshot.
+    simulated : bool
+        Written beside the points: all that is made of them says so.
 
     Raises
     ------
@@ -83,7 +92,8 @@ def write_bundle(
     try:
         temporary.mkdir(parents=True)
         points = POINTS.to_table(cloud)
-        points = points.replace_schema_metadata(points.schema.metadata | {_FRAME: frame.encode()})
+        about = {_FRAME: frame.encode(), _SIMULATED: b"true" if simulated else b"false"}
+        points = points.replace_schema_metadata(points.schema.metadata | about)
         _write(temporary / POINTS_FILE, points, POINTS.write_options)
         _write(temporary / SNAPSHOTS_FILE, SNAPSHOTS.to_table(snapshots), SNAPSHOTS.write_options)
         _put_in_place(temporary, folder)

@@ -86,6 +86,8 @@ class RawCloud:
     poses: Poses | None = None
     convention: Convention = Convention()
     notes: tuple[str, ...] = ()
+    simulated: bool = False
+    """whether the file itself says so"""
 
 
 def compact(xyz: NDArray[np.floating]) -> NDArray[np.floating]:

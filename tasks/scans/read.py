@@ -134,6 +134,7 @@ def _registered(
         up_guessed=up.guessed,
         scale=float(scale.value),
         scale_guessed=scale.guessed,
+        simulated=raw.simulated,
         notes=" ".join(note for note in (*raw.notes, up.note, scale.note, coarse, far) if note),
     )
     return done.cloud, snapshots, scan

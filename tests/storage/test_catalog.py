@@ -139,7 +139,9 @@ def test_sql_reaches_no_file(store, sql):
 
 
 def test_a_query_that_cannot_be_answered_says_why(store):
-    with pytest.raises(QueryError, match="'stage_tims' is no named query; there are cache_hits"):
+    with pytest.raises(
+        QueryError, match="'stage_tims' is no named query; there are area_error, cache_hits"
+    ):
         run_query(store, "stage_tims")
     with pytest.raises(QueryError, match="Parser Error"):
         run_query(store, "selec 1")

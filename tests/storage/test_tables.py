@@ -86,7 +86,7 @@ VALUES = {
         np.array([0.0, 0.1]), RNG.normal(size=(2, 3)), np.eye(4)[:2], np.array([3, 2**33])
     ),
     "no snapshots": none(),
-    "scan": Scan("s1", "ply", 10, 8, 1, 1, 0, "-y", True, 0.01, False, "Höhe: geschätzt"),
+    "scan": Scan("s1", "ply", 10, 8, 1, 1, 0, "-y", True, 0.01, False, True, "Höhe: geschätzt"),
     "planes": Planes(
         unit(4), RNG.normal(size=4), np.arange(4) + 2**33, RNG.random(4), np.array([1e6, -2e6, 0.3])
     ),

@@ -199,3 +199,10 @@ def test_a_missing_or_cut_table_is_named(tmp_path, file, content):
         (folder / file).write_bytes(content)
     with pytest.raises(InputError, match=file):
         read(folder)
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_a_simulated_bundle_says_so_to_who_reads_it(tmp_path, simulated):
+    cloud = PointCloud(np.random.default_rng(0).random((50, 3), np.float32), np.zeros(3))
+    write_bundle(tmp_path / "s.scan", cloud, none(), simulated=simulated)
+    assert read(tmp_path / "s.scan")[2].simulated is simulated
