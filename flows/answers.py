@@ -103,6 +103,16 @@ def write_answer(answer: pa.Table, form: str, file: IO[str]) -> None:
         print_table(answer, file)
 
 
+def print_answers(answers: dict[str, pa.Table], as_json: bool) -> None:
+    """Print several tables by title, or all as one JSON object."""
+    if as_json:
+        print(json.dumps({k: v.to_pylist() for k, v in answers.items()}, indent=1, default=str))
+        return
+    for title, table in answers.items():
+        print(f"\n{title}")
+        print_table(table)
+
+
 def print_table(table: pa.Table, file: IO[str] | None = None) -> None:
     """Print a table for people."""
     from rich.console import Console

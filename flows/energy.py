@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from flows import progress, stages
 from flows.params import MapSenseParams
+from flows.plans import plan_source
 from flows.storey import threads
 from storage.artifacts import Place, check_name, read
 from storage.campaign import FILE, CampaignScan, CampaignStorey, read_campaign
@@ -19,7 +19,7 @@ from storage.errors import InputError
 from storage.plan_geojson import read_plan
 from storage.quality import QUALITY
 from storage.room_errors import ROOM_ERRORS
-from storage.runs import COMPLETED, PARTIAL, Run, new_id, recorded
+from storage.runs import COMPLETED, ENERGY, PARTIAL, Run, new_id, recorded
 from storage.sources import Source
 from storage.streams import STREAMS
 from tasks.device.codec import CodecParams
@@ -27,7 +27,6 @@ from tasks.device.work import Tally
 from tasks.evaluation.rooms import EvaluateParams
 from tasks.scans.sources import find_sources
 
-VERB = "energy"
 GRAMAP = CodecParams(profile="low")
 """GraMap compresses all points at the low profile."""
 PER_SCAN = 12
@@ -62,7 +61,7 @@ class EnergyRequest(BaseModel):
         return Place(store=self.store, run=self.run, building=self.building, storey=storey)
 
 
-@flow(name=VERB, flow_run_name="{request.building}", task_runner=threads())
+@flow(name=ENERGY, flow_run_name="{request.building}", task_runner=threads())
 def measure_energy(request: EnergyRequest) -> None:
     """Count each scan's work and bytes, map each alone, and charge the methods (Fig. 19)."""
     campaign = read_campaign(Path(request.folder))
@@ -84,7 +83,7 @@ def measure_energy(request: EnergyRequest) -> None:
 def _run(request: EnergyRequest, storey: str) -> Run:
     return Run(
         id=request.run,
-        verb=VERB,
+        verb=ENERGY,
         building=request.building,
         storey=storey,
         asked=request.model_dump_json(),
@@ -184,7 +183,4 @@ def _truth(folder: Path, storey: CampaignStorey) -> Source:
     if unknown := [scan for scan in storey.scans if scan.room not in known]:
         problem = f"has no room '{unknown[0].room}', which scan '{unknown[0].scan}' is of"
         raise InputError(path, problem, "simulate the campaign again")
-    data = path.read_bytes()
-    return Source(
-        name="truth", path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data)
-    )
+    return plan_source(path)

@@ -1,7 +1,6 @@
 """Score a mapped storey against its true plan."""
 
 from datetime import UTC, datetime
-from hashlib import sha256
 from pathlib import Path
 
 from prefect import flow
@@ -9,10 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from flows import stages
 from flows.params import MapSenseParams
+from flows.plans import plan_source
 from storage.artifacts import Place, check_name
 from storage.plan_geojson import read_plan
 from storage.runs import COMPLETED, EVALUATE, Run, new_id, recorded
-from storage.sources import Source
 
 
 class EvaluationRequest(BaseModel):
@@ -47,7 +46,10 @@ def evaluate_storey(request: EvaluationRequest) -> None:
     place = Place(
         store=request.store, run=request.run, building=request.building, storey=request.storey
     )
-    found, truth = plan_source(Path(request.plan)), plan_source(Path(request.truth))
+    paths = [Path(request.plan), Path(request.truth)]
+    for path in paths:
+        read_plan(path)  # what is no plan is said before anything runs
+    found, truth = (plan_source(path) for path in paths)
     run = Run(
         id=request.run,
         verb=EVALUATE,
@@ -60,12 +62,3 @@ def evaluate_storey(request: EvaluationRequest) -> None:
         stages.detections(place, found, truth, request.params.evaluation)
         stages.wall_quality(place, found, truth, request.params.wall_quality)
         record.end(COMPLETED, "")
-
-
-def plan_source(path: Path) -> Source:
-    """Return a plan's file as a stage's input, or raise InputError if it is no plan."""
-    read_plan(path)
-    data = path.read_bytes()
-    return Source(
-        name="plan", path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data)
-    )

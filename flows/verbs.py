@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flows.answers import print_table, state_now
+from flows.answers import print_answers, print_table, state_now
 from flows.server import prefect_api
 from flows.settings import Settings, load_settings
 from storage.artifacts import check_name
 from storage.errors import MapSenseError, StoreError
-from storage.runs import COMPLETED, Run, goes_on, last_runs, read_runs
+from storage.runs import COMPLETED, ENERGY, Run, goes_on, last_runs, read_runs
 
 
 def map_scans(
@@ -102,6 +102,7 @@ def simulate_campaign(
 
     from flows import campaign
     from flows.params import explain
+    from tasks.device.work import RAW_BYTES
 
     if bool(plans) == bool(preset):
         raise MapSenseError("name a plan (GeoJSON or IFC) to scan, or a --preset, and not both")
@@ -134,7 +135,7 @@ def simulate_campaign(
     print(
         f"{building}: {_count(len(all_scans), 'simulated scan')} of "
         f"{_count(len(made.storeys), 'storey')}, {points:,} points "
-        f"({points * 12 / 1e9:.2f} GB as raw floats)"
+        f"({points * RAW_BYTES / 1e9:.2f} GB as raw floats)"
     )
     for each in made.storeys:
         print(f"{out / each.storey}: scans/, truth.geojson")
@@ -173,12 +174,8 @@ def evaluate_plan(
             params=parse_params(settings.params),
         )
         answers = run_evaluation(request, not as_json)
-    if as_json:
-        print(json.dumps({k: v.to_pylist() for k, v in answers.items()}, indent=1, default=str))
-        return 0
-    for title, table in answers.items():
-        print(f"\n{name}/{level}: {title}")
-        print_table(table)
+    titled = answers if as_json else {f"{name}/{level}: {k}": v for k, v in answers.items()}
+    print_answers(titled, as_json)
     return 0
 
 
@@ -211,12 +208,7 @@ def charge_campaign(
         )
         answers = run_energy(request, settings.jobs, not as_json)
         missing = left_out(request)
-    if as_json:
-        print(json.dumps({k: v.to_pylist() for k, v in answers.items()}, indent=1, default=str))
-    else:
-        for title, table in answers.items():
-            print(f"\n{title}")
-            print_table(table)
+    print_answers(answers, as_json)
     for line in missing:
         print(f"mapsense: {line}", file=sys.stderr)
     return 1 if missing else 0
@@ -230,7 +222,7 @@ def run_again(
     root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
     last = last_runs(read_runs(root, building, storey))
     # a campaign's energy is charged again by its own verb
-    last = [run for run in last if run.verb != "energy"]
+    last = [run for run in last if run.verb != ENERGY]
     again = [run for run in last if run.state != COMPLETED and not goes_on(str(root), run)]
     if not again:
         if as_json:

@@ -16,6 +16,7 @@ from flows.request import StoreyRequest
 from flows.server import wait_until_up
 from flows.storey import threads
 from storage.catalog import Catalog
+from storage.energy import STOREY
 from storage.errors import MapSenseError
 from storage.runs import COMPLETED, Run, read_runs
 
@@ -59,13 +60,9 @@ def run_energy(request: EnergyRequest, jobs: int, show: bool) -> dict[str, pa.Ta
     """Charge the methods for a campaign; return the answers people ask for, by title."""
     with _engine(show):
         state = measure_energy.with_options(task_runner=threads(jobs))(request, return_state=True)
-    if not state.is_completed():
-        error = state.result(raise_on_failure=False)
-        if isinstance(error, Exception):
-            raise error
-        raise MapSenseError(f"{request.building}: {state.message}")
-    catalog = Catalog(request.store)
-    return {title: _own(catalog.query(name), request) for title, name in ENERGY_ANSWERS.items()}
+    _raise_failure(state, request.building)
+    of_rooms = {"building": request.building, "series": STOREY}  # not the accumulated ones
+    return _answers(request.store, ENERGY_ANSWERS, of_rooms)
 
 
 def left_out(request: EnergyRequest) -> list[str]:
@@ -78,31 +75,31 @@ def run_evaluation(request: EvaluationRequest, show: bool) -> dict[str, pa.Table
     """Score a plan against its truth; return the answers people ask for, by title."""
     with _engine(show):
         state = evaluate_storey(request, return_state=True)
-    if not state.is_completed():
-        error = state.result(raise_on_failure=False)
-        if isinstance(error, Exception):
-            raise error
-        raise MapSenseError(f"{request.building}/{request.storey}: {state.message}")
-    catalog = Catalog(request.store)
+    _raise_failure(state, f"{request.building}/{request.storey}")
+    place = {"building": request.building, "storey": request.storey}
+    answers = _answers(request.store, SCORES, place)
+    # a storey's plan is of no single scan
+    return {title: answer.drop_columns(["scan"]) for title, answer in answers.items()}
+
+
+def _raise_failure(state: Any, what: str) -> None:
+    """Raise what stopped a flow, if it did not end well."""
+    if state.is_completed():
+        return
+    error = state.result(raise_on_failure=False)
+    raise error if isinstance(error, Exception) else MapSenseError(f"{what}: {state.message}")
+
+
+def _answers(store: str, queries: dict[str, str], only: dict[str, str]) -> dict[str, pa.Table]:
+    """Return the answers to named queries by title: rows of the values asked for, without these."""
+    catalog = Catalog(store)
     answers = {}
-    for title, name in SCORES.items():
+    for title, name in queries.items():
         answer = catalog.query(name)
-        rows = pc.and_(
-            pc.equal(answer["building"], request.building),
-            pc.equal(answer["storey"], request.storey),
-        )
-        shown = [c for c in answer.column_names if c not in ("building", "storey", "scan")]
-        answers[title] = answer.filter(rows).select(shown)
+        for column in only.keys() & set(answer.column_names):
+            answer = answer.filter(pc.equal(answer[column], only[column])).drop_columns([column])
+        answers[title] = answer
     return answers
-
-
-def _own(answer: pa.Table, request: EnergyRequest) -> pa.Table:
-    """Return the rows of one building; of the accumulated ones, those of one query a room."""
-    rows = pc.equal(answer["building"], request.building)
-    if "series" in answer.column_names:
-        rows = pc.and_(rows, pc.equal(answer["series"], "storey"))
-    shown = [c for c in answer.column_names if c not in ("building", "series")]
-    return answer.filter(rows).select(shown)
 
 
 def is_done(summary: dict[str, Any]) -> bool:

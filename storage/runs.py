@@ -19,6 +19,8 @@ from storage.errors import StoreError
 from storage.stages import reason
 
 RUNNING, COMPLETED, PARTIAL, FAILED = "running", "completed", "partial", "failed"
+ENERGY = "energy"
+"""The verb of runs that charge a campaign."""
 EVALUATE = "evaluate"
 """The verb of runs that measure what others made: they are no news of the storey's mapping."""
 MAPPED = (COMPLETED, PARTIAL)

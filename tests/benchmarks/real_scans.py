@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 import shapely
-from scipy.optimize import linear_sum_assignment
+
+from tasks.evaluation.rooms import ious, match
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 STAGES = (
@@ -145,10 +146,9 @@ def score(plan: Path, truth_file: Path, name: str) -> dict[str, Any]:
         found = [shapely.transform(p, lambda xy: xy @ matrix[:2, :2].T + matrix[:2, 3])
                  for p in found]  # fmt: skip
     rooms = [shapely.Polygon(r["polygon"]) for r in truth["rooms"]]
-    iou = np.array([[p.intersection(t).area / p.union(t).area for t in rooms] for p in found])
-    iou = iou.reshape(len(found), len(rooms))
-    i, j = linear_sum_assignment(-iou)
-    hits = int((iou[i, j] > 0.5).sum())
+    overlap = ious(found, rooms)
+    best = np.append(overlap, np.zeros((1, len(rooms))), axis=0)[match(overlap), range(len(rooms))]
+    hits = int((best > 0.5).sum())
     pieces = truth.get("room_faces") or truth["walls"]
     outlines = shapely.union_all([p.exterior for p in found])
     near = length = 0.0
