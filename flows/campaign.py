@@ -1,7 +1,7 @@
 """Simulate a crowdsensing campaign: volunteers scan a building's storeys, into a folder."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from storage.plan_geojson import read_plan, write_plan
 from storage.plan_ifc import ifc_storeys, read_ifc_storey
 from tasks.params import Params
 from tasks.scans.bundle import write_bundle
-from tasks.simulation.campaign import CampaignParams, shares, simulate_scan
+from tasks.simulation.campaign import CampaignParams, Recording, shares, simulate_scans
 from tasks.simulation.defaults import SimulationDefaults, complete_plan
 from tasks.simulation.ifc import IfcMeshParams, ifc_mesh
 from tasks.simulation.mesh import Mesh, storey_mesh
@@ -117,38 +117,42 @@ def simulate(
     for site, name, count in zip(sites, names, each, strict=True):
         truth = folder / name / "truth.geojson"
         write_plan(site.plan, truth)
-        of_storey = params.model_copy(update={"scans": count}) if count else None
-        made = _scans(site, folder, name, of_storey, told) if of_storey is not None else ()
+        of_storey = params.model_copy(update={"scans": count})
+        recorded = record_scans(site, folder / name / "scans", of_storey, told) if count else ()
         storeys.append(
-            CampaignStorey(storey=name, truth=truth.relative_to(folder).as_posix(), scans=made)
+            CampaignStorey(
+                storey=name,
+                truth=truth.relative_to(folder).as_posix(),
+                scans=tuple(_record(s, p.relative_to(folder).as_posix()) for p, s in recorded),
+            )
         )
     campaign = Campaign(building=building, simulated=True, seed=params.seed, storeys=tuple(storeys))
     write_campaign(campaign, folder)
     return campaign
 
 
-def _scans(
-    site: Site, folder: Path, storey: str, params: CampaignParams, told: Callable[[str], None]
-) -> tuple[CampaignScan, ...]:
-    scene = Scene(site.mesh)
-    made = []
-    for index in range(params.scans or 0):
-        scan = simulate_scan(scene, site.plan, index, params)
-        path = folder / storey / "scans" / f"{scan.name}.scan"
+def record_scans(
+    site: Site, folder: Path, params: CampaignParams, told: Callable[[str], None]
+) -> Iterator[tuple[Path, Recording]]:
+    """Simulate a storey's scans into a folder; yield each with its bundle once it is written."""
+    for scan in simulate_scans(site.plan, params, Scene(site.mesh)):
+        path = folder / f"{scan.name}.scan"
         write_bundle(path, scan.cloud, scan.snapshots, frame="device", simulated=True)
-        made.append(
-            CampaignScan(
-                scan=scan.name,
-                path=path.relative_to(folder).as_posix(),
-                room=scan.room,
-                volunteer=f"v{scan.volunteer}",
-                skill=round(scan.skill, 3),
-                duration_s=scan.duration_s,
-                points=len(scan.cloud),
-            )
-        )
-        told(f"simulated scan {storey}/{scan.name}: {len(scan.cloud):,} points")
-    return tuple(made)
+        told(f"simulated scan {site.plan.storey}/{scan.name}: {len(scan.cloud):,} points")
+        yield path, scan
+
+
+def _record(scan: Recording, path: str) -> CampaignScan:
+    """Return what a campaign remembers of a scan."""
+    return CampaignScan(
+        scan=scan.name,
+        path=path,
+        room=scan.room,
+        volunteer=f"v{scan.volunteer}",
+        skill=round(scan.skill, 3),
+        duration_s=scan.duration_s,
+        points=len(scan.cloud),
+    )
 
 
 def _name_of(plan: Plan) -> str:

@@ -4,11 +4,12 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from flows.campaign import Site, record_scans
 from storage.plan import Plan, PlanRoom
 from storage.plan_geojson import write_plan
 from tasks.evaluation.rooms import ious, match
-from tasks.scans.bundle import write_bundle
-from tasks.simulation.campaign import CampaignParams, simulate_scans
+from tasks.simulation.campaign import CampaignParams
+from tasks.simulation.mesh import storey_mesh
 from tasks.simulation.plan import StoreyParams, make_storey
 from tasks.simulation.sensor import SensorParams
 from tasks.simulation.volunteers import VolunteerParams
@@ -39,12 +40,9 @@ def simulate(folder: Path, seed: int, told: Callable[[str], None]) -> tuple[Plan
     """Simulate a furnished storey and its scans into a folder; return the truth and the scans."""
     truth = make_storey(StoreyParams(seed=seed), BUILDING, STOREY)
     write_plan(truth, folder / "truth.geojson")
-    scans = []
-    for scan in simulate_scans(truth, small_campaign(seed, len(truth.rooms) + AGAIN)):
-        scans.append(folder / "scans" / f"{scan.name}.scan")
-        write_bundle(scans[-1], scan.cloud, scan.snapshots, frame="device", simulated=True)
-        told(f"simulated scan {scan.name}: {len(scan.cloud):,} points")
-    return truth, tuple(scans)
+    site = Site(truth, storey_mesh(truth))
+    params = small_campaign(seed, len(truth.rooms) + AGAIN)
+    return truth, tuple(path for path, _ in record_scans(site, folder / "scans", params, told))
 
 
 def small_campaign(seed: int, scans: int) -> CampaignParams:

@@ -70,18 +70,25 @@ class Recording:
         return float(self.truth.times[-1])
 
 
-def simulate_scans(plan: Plan, params: CampaignParams) -> Iterator[Recording]:
+def simulate_scans(
+    plan: Plan, params: CampaignParams, scene: Scene | None = None
+) -> Iterator[Recording]:
     """Yield one simulated scan after the other, so that only one is in memory.
 
     Every room is scanned once, in the plan's order, then all again in another order by another
     volunteer, and so on. Scans differ by storey and index alone: more scans change none before.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        What is scanned; None: the plan's own mesh.
 
     Raises
     ------
     MapSenseError
         If a height or a thickness the simulation needs is unknown.
     """
-    scene = Scene(storey_mesh(plan))
+    scene = scene or Scene(storey_mesh(plan))
     for index in range(_count(plan, params)):
         yield simulate_scan(scene, plan, index, params)
 
