@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from storage.coverage import Coverage
 from storage.faces import SEEN_WALL, Faces
 from tasks.surfaces.directions import face_angles, frames, off_frames
+from tasks.surfaces.seen import CellSet, places_along
 
 SNAP = 1e-4
 """Grid all corners of the arrangement are rounded to, metres."""
@@ -244,20 +245,12 @@ def _means(
 def open_share(arrangement: Arrangement, coverage: Coverage) -> NDArray[np.float64]:
     """Return the share of each edge across which floor or ceiling was seen to run on, (m,)."""
     cells, size = closed(coverage)
-    seen = {(int(x), int(y)) for x, y in cells}
-    spans = arrangement.edges[:, 1] - arrangement.edges[:, 0]
-    lengths = np.linalg.norm(spans, axis=1)
-    counts = np.maximum(1, np.ceil(lengths / size)).astype(int)
-    edge = np.repeat(np.arange(len(counts)), counts)
-    place = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
-    share = (place + 0.5) / counts[edge]
-    at = arrangement.edges[edge, 0] + share[:, None] * spans[edge]
-    across = np.column_stack((-spans[:, 1], spans[:, 0])) / np.maximum(lengths, 1e-9)[:, None]
-    run_on = np.ones(len(edge), bool)
+    seen = CellSet(cells, size)
+    places = places_along(arrangement.edges, size)
+    run_on = np.ones(len(places.edge), bool)
     for step in (-1.5, 0.0, 1.5):
-        key = np.floor((at + step * size * across[edge]) / size).astype(int)
-        run_on &= np.fromiter(((int(x), int(y)) in seen for x, y in key), bool, len(key))
-    return np.bincount(edge, run_on, minlength=len(counts)) / counts
+        run_on &= seen.holds(places.at + step * size * places.across)
+    return places.mean(run_on)
 
 
 def solid_share(

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from storage.coverage import Coverage
 from storage.occupancy import Occupancy
+from tasks.surfaces.seen import places_along
 
 FEET, HEADS = 0.3, 0.25
 """What lies less than this above the floor or below the ceiling tells of these, metres."""
@@ -39,18 +40,11 @@ class Columns:
 
     def share(self, edges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the mean share of the height that is occupied along (m, 2, 2) edges, (m,)."""
-        spans = edges[:, 1] - edges[:, 0]
-        lengths = np.linalg.norm(spans, axis=1)
-        counts = np.maximum(1, np.ceil(lengths / self._cell)).astype(int)
-        edge = np.repeat(np.arange(len(counts)), counts)
-        place = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
-        at = edges[edge, 0] + ((place + 0.5) / counts[edge])[:, None] * spans[edge]
-        across = np.column_stack((-spans[:, 1], spans[:, 0])) / np.maximum(lengths, 1e-9)[:, None]
-        occupied = np.zeros(len(edge), np.uint32)
+        places = places_along(edges, self._cell)
+        occupied = np.zeros(len(places.edge), np.uint32)
         for step in np.arange(-BESIDE, BESIDE + 1e-9, self._cell / 2):
-            occupied |= self._over(at + step * across[edge])
-        share = np.bitwise_count(occupied) / self._bins
-        return np.bincount(edge, share, minlength=len(counts)) / counts
+            occupied |= self._over(places.at + step * places.across)
+        return places.mean(np.bitwise_count(occupied) / self._bins)
 
     def _over(self, xy: NDArray[np.float64]) -> NDArray[np.uint32]:
         """Return the columns over (n, 2) places."""
