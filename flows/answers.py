@@ -50,6 +50,14 @@ def ask(what: str | None, store: Path | None, form: str, out: Path | None) -> in
     return 0
 
 
+def make_report(store: Path | None, out: Path, building: str | None) -> int:
+    """Write the figures and the page of a store."""
+    from flows.report.page import write_report
+
+    print(write_report(_existing(store), out, building))
+    return 0
+
+
 def show_status(building: str | None, storey: str | None, store: Path | None, as_json: bool) -> int:
     """Show the last run of each storey."""
     root = _existing(store)

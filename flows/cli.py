@@ -26,6 +26,7 @@ app = App(
     help="Crowd-sourced indoor 3D scans in, accurate indoor models out.",
     help_format="markdown",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,  # main says what is kept
 )
 
 Store = Annotated[
@@ -186,29 +187,76 @@ def energy(
 
 @app.command
 def evaluate(
-    plan: Annotated[Path, Parameter(help="The mapped plan, GeoJSON.")],
+    what: Annotated[
+        Path,
+        Parameter(help="A mapped plan, a campaign's folder, or a TOML file of what is compared."),
+    ],
     /,
     *,
-    truth: Annotated[Path, Parameter(help="The true plan, GeoJSON, in the same frame.")],
-    building: Annotated[str | None, Parameter(help="Building. [default: the plan's]")] = None,
-    storey: Annotated[str | None, Parameter(help="Storey. [default: the plan's]")] = None,
+    truth: Annotated[
+        Path | None,
+        Parameter(
+            help="What is true of a mapped plan, in its frame: GeoJSON, IFC, labelled points."
+        ),
+    ] = None,
+    truth_storey: Annotated[
+        str | None, Parameter(help="Storey of an IFC file. [default: it has one alone]")
+    ] = None,
+    seeds: Annotated[
+        str | None,
+        Parameter(help="Repeats of a campaign: how many, or which, as 0,3,7. [default: 10]"),
+    ] = None,
+    building: Annotated[
+        str | None, Parameter(help="Building. [default: the plan's, or the campaign's]")
+    ] = None,
+    storey: Annotated[
+        str | None, Parameter(help="Storey. [default: the plan's, or all of the campaign]")
+    ] = None,
     store: Store = None,
     set_: Set = None,
+    jobs: Jobs = None,
     json: Json = False,
     verbose: Verbose = False,
     debug: Debug = False,
 ) -> int:
     """Score a mapped plan: rooms, corners, walls, doors, windows, furniture. Nothing is aligned.
 
+    Without --truth, map and score a campaign, or every storey, variant and seed that a file names.
+    What was computed before comes from the cache, after an interruption too.
+
     For example
 
     ```
     mapsense evaluate ring/plan.geojson --truth campaign/ring/truth.geojson
+    mapsense evaluate campaign --seeds 10
+    mapsense evaluate experiment.toml --json
     ```
     """
-    from flows.verbs import evaluate_plan
+    from flows.scoring import evaluate as score
 
-    return evaluate_plan(plan, truth, building, storey, store, set_ or [], json)
+    return score(what, truth, truth_storey, building, storey, seeds, store, set_ or [], jobs, json)
+
+
+@app.command
+def report(
+    *,
+    out: Annotated[Path, Parameter(help="Folder of the report.")],
+    building: Annotated[str | None, Parameter(help="Only this building.")] = None,
+    store: Store = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Draw the paper's figures from what was measured: SVG, PNG, and one page with all of them.
+
+    For example
+
+    ```
+    mapsense report --out report
+    ```
+    """
+    from flows.answers import make_report
+
+    return make_report(store, out, building)
 
 
 @app.command

@@ -19,7 +19,7 @@ from storage.errors import InputError
 from storage.plan_geojson import read_plan
 from storage.quality import QUALITY
 from storage.room_errors import ROOM_ERRORS
-from storage.runs import COMPLETED, ENERGY, PARTIAL, Run, new_id, recorded
+from storage.runs import COMPLETED, ENERGY, PARTIAL, Run, new_id, parameter_set, recorded
 from storage.sources import Source
 from storage.streams import STREAMS
 from tasks.device.codec import CodecParams
@@ -88,6 +88,7 @@ def _run(request: EnergyRequest, storey: str) -> Run:
         storey=storey,
         asked=request.model_dump_json(),
         started_at=datetime.now(UTC),
+        parameters=parameter_set(request.params.model_dump(mode="json")),
     )
 
 

@@ -15,6 +15,8 @@ from tasks.device.targets import TargetParams
 from tasks.device.voxels import VoxelParams
 from tasks.device.work import WorkParams
 from tasks.evaluation.detections import EvaluationParams
+from tasks.evaluation.planes import PlaneQualityParams
+from tasks.evaluation.points import PointQualityParams
 from tasks.evaluation.walls import WallQualityParams
 from tasks.params import Params
 from tasks.scans.read import ReadParams
@@ -56,6 +58,10 @@ class MapSenseParams(Params):
     """The savings wanted."""
     evaluation: EvaluationParams = EvaluationParams()
     """When an object is found (Sec. 7.3)."""
+    plane_quality: PlaneQualityParams = PlaneQualityParams()
+    """When a plane of a scan is a true one."""
+    point_quality: PointQualityParams = PointQualityParams()
+    """When a labelled point lies on what was found."""
     wall_quality: WallQualityParams = WallQualityParams()
     """Completeness, correctness and accuracy of walls."""
 

@@ -14,31 +14,52 @@ from tasks.stage.ledger import watched
 
 
 class Display:
-    """One bar per storey: stages done of stages to do."""
+    """One bar per storey: stages done of stages to do; and one per experiment, of its repeats."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
         self._bars: dict[str, BarId] = {}
 
-    def expect(self, place: Place, stages: int) -> None:
-        """Show a storey of which a number of stages will run."""
-        title = f"{place.building}/{place.storey}"
-        self._bars[place.run] = self._progress.add_task(title, total=stages, last="")
+    def expect(self, key: str, title: str, total: int) -> None:
+        """Show a bar of so many steps; a key stands for a run or an experiment."""
+        self._bars[key] = self._progress.add_task(title, total=total, last="")
 
-    def advance(self, place: Place, row: StageRow) -> None:
-        """Show that a stage has ended."""
-        if (bar := self._bars.get(place.run)) is not None:
-            last = f"{row.stage} {row.scan or ''} {row.outcome} {row.wall_s:.1f} s"
+    def advance(self, key: str, last: str) -> None:
+        """Show that a step was done."""
+        if (bar := self._bars.get(key)) is not None:
             self._progress.update(bar, advance=1, last=last)
+
+    def remove(self, key: str) -> None:
+        """Show a bar no more."""
+        if (bar := self._bars.pop(key, None)) is not None:
+            self._progress.remove_task(bar)
+
+    def stage_ended(self, place: Place, row: StageRow) -> None:
+        """Show that a stage has ended."""
+        last = f"{row.stage} {row.scan or ''} {row.outcome} {row.wall_s:.1f} s"
+        self.advance(place.run, last)
 
 
 _displays: list[Display] = []
 
 
-def expect(place: Place, stages: int) -> None:
-    """Say how many stages a storey will run, if anyone watches."""
+def expect(place: Place, stages: int, title: str | None = None) -> None:
+    """Say how many stages a storey will run, if anyone watches; None: it is called as it is."""
     for display in _displays:
-        display.expect(place, stages)
+        display.expect(place.run, title or f"{place.building}/{place.storey}", stages)
+
+
+def gather(experiment: str, title: str, repeats: int) -> None:
+    """Say how many repeats an experiment will run, if anyone watches."""
+    for display in _displays:
+        display.expect(experiment, title, repeats)
+
+
+def ended(place: Place, experiment: str) -> None:
+    """Say that a repeat of an experiment has ended: it is one of many, its bar goes."""
+    for display in _displays:
+        display.remove(place.run)
+        display.advance(experiment, "")
 
 
 @contextmanager
@@ -58,7 +79,7 @@ def shown(wanted: bool) -> Iterator[None]:
         display = Display(progress)
         _displays.append(display)
         try:
-            with watched(display.advance):
+            with watched(display.stage_ended):
                 yield
         finally:
             _displays.remove(display)

@@ -4,10 +4,12 @@ import json
 from collections import defaultdict
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from flows.request import StoreyRequest
 from storage import coverage as stored_coverage
+from storage.artifacts import Ref
 from storage.files import write_whole
 from storage.plan import Plan
 from storage.plan_geojson import write_plan
@@ -18,6 +20,9 @@ from storage.stages import StageRow, of_run
 from tasks.exports.coverage import Coverage
 from tasks.exports.drawing import draw_plan
 
+INITIAL, FINAL = "initial.geojson", "plan.geojson"
+"""Files of the initial and of the final model."""
+
 
 @dataclass(frozen=True)
 class Skipped:
@@ -25,6 +30,15 @@ class Skipped:
 
     scan: str
     reason: str
+
+
+@dataclass(frozen=True)
+class UsedScan:
+    """What of a used scan others may compare: its decoded points and their segments."""
+
+    name: str
+    points: Ref
+    segments: Ref
 
 
 @dataclass(frozen=True)
@@ -40,17 +54,23 @@ class Mapped:
     """scans the quality gate kept on their devices"""
     rows: dict[str, int]
     """rows of each table, over all scans"""
+    used: tuple[UsedScan, ...]
 
 
 def write_results(request: StoreyRequest, mapped: Mapped) -> None:
     """Write the plan and its drawings, each whole or not at all."""
     folder = request.folder()
-    # the initial model is the final one until the grammar refines it
-    write_plan(mapped.plan, folder / "initial.geojson")
-    write_plan(mapped.plan, folder / "plan.geojson")
+    write_plans(mapped, folder)
     seen = mapped.coverage
     drawn = Coverage(seen.centres(), seen.cell_m, seen.scans)
     draw_plan(mapped.plan, drawn, folder / "plan.svg", folder / "plan.png")
+
+
+def write_plans(mapped: Mapped, folder: Path) -> None:
+    """Write the initial and the final model, each whole or not at all."""
+    # the initial model is the final one until the grammar refines it
+    write_plan(mapped.plan, folder / INITIAL)
+    write_plan(mapped.plan, folder / FINAL)
 
 
 def summarise(

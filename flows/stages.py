@@ -9,6 +9,8 @@ from tasks.device.targets import solve_targets
 from tasks.device.voxels import voxel_grid
 from tasks.device.work import tally_work
 from tasks.evaluation.detections import evaluate_plans
+from tasks.evaluation.planes import evaluate_planes
+from tasks.evaluation.points import evaluate_points
 from tasks.evaluation.rooms import room_errors as compare_rooms
 from tasks.evaluation.walls import evaluate_walls
 from tasks.scans.read import read_scan
@@ -31,6 +33,8 @@ faces = stage(label_surfaces, name="faces")
 rooms = stage(intersect_walls, name="rooms")
 
 room_errors = stage(compare_rooms, name="room_errors")
+plane_detections = stage(evaluate_planes, name="plane_detections")
+point_quality = stage(evaluate_points, name="point_quality")
 detections = stage(evaluate_plans, name="detections")
 wall_quality = stage(evaluate_walls, name="wall_quality")
 scan_work = stage(tally_work, name="scan_work")
@@ -41,3 +45,10 @@ energy_targets = stage(solve_targets, name="energy_targets")
 
 PER_SCAN = len((clouds, quality, voxels, streams, decoded, planes, segments, occupancy))
 PER_STOREY = len((faces, rooms))
+PER_PLAN = len((detections, wall_quality))
+PER_TRUE_SCAN = len((plane_detections,))
+
+
+def of_mapping(scans: int) -> int:
+    """Return how many stages the mapping of a storey runs."""
+    return PER_SCAN * scans + PER_STOREY

@@ -17,6 +17,7 @@ from flows.request import StoreyRequest
 from flows.results import (
     Mapped,
     Skipped,
+    UsedScan,
     summarise,
     write_results,
     write_summary,
@@ -27,7 +28,7 @@ from storage.coverage import COVERAGE
 from storage.errors import StoreError
 from storage.quality import QUALITY
 from storage.rooms import ROOMS
-from storage.runs import FAILED, Run, recorded
+from storage.runs import FAILED, Run, parameter_set, recorded
 from storage.scans import SCANS
 from storage.sources import Source
 from storage.stages import forget, reason
@@ -55,6 +56,7 @@ def map_storey(request: StoreyRequest) -> Any:
         storey=request.storey,
         asked=request.model_dump_json(),
         started_at=started_at,
+        parameters=parameter_set(request.params.model_dump(mode="json")),
     )
     with recorded(request.store, run) as record:
         try:
@@ -73,20 +75,32 @@ def _run(request: StoreyRequest, started_at: datetime) -> dict[str, Any]:
     """Map the storey, write what was found, and return its summary."""
     sources, errors = find_sources([Path(path) for path in request.scans])
     skipped = [Skipped(error.path, reason(error)) for error in errors]
-    mapped = _map(request, sources, skipped) if sources else None
+    mapped = None
+    if sources:
+        progress.expect(request.place(), stages.of_mapping(len(sources)))
+        mapped = map_scans(request, sources, skipped)
     if mapped is not None:
         write_results(request, mapped)
-    message = _message(len(sources) + len(errors), skipped, mapped)
+    message = ending(len(sources) + len(errors), skipped, mapped)
     summary = summarise(request, mapped, skipped, message, started_at)
     write_summary(request, summary)
     return summary
 
 
-def _map(request: StoreyRequest, sources: list[Source], skipped: list[Skipped]) -> Mapped | None:
-    """Map the storey from the scans that can be used; None if there is none."""
+def map_scans(
+    request: StoreyRequest, sources: list[Source], skipped: list[Skipped]
+) -> Mapped | None:
+    """Map the storey from the scans that can be used; None if there is none.
+
+    Every stage is the flow's task runner's: storeys that are mapped at once share its workers.
+
+    Parameters
+    ----------
+    skipped : list of Skipped
+        Scans that could not be used are added, each with its reason.
+    """
     place, params = request.place(), request.params
     at = {source.name: place.of_scan(source.name) for source in sources}
-    progress.expect(place, stages.PER_SCAN * len(at) + stages.PER_STOREY)
 
     # one stage after the other over all scans: a worker that takes a task finds its inputs made
     # on the device: registered snapshots, the quality gate, voxels, the octree stream (Sec. 3)
@@ -111,15 +125,17 @@ def _map(request: StoreyRequest, sources: list[Source], skipped: list[Skipped]) 
     if not used:
         skipped += [Skipped(n, why) for n, why in rejected.items()]
         return None
-    faces = stages.faces(place, [segments[n].result() for n in used], params.label)
+    segmented = [segments[n].result() for n in used]
+    faces = stages.faces.submit(place, segmented, params.label).result()
     space = [occupancy[n].result() for n in used]
-    rooms = stages.rooms(place, faces, faces, space, params.intersect)
+    rooms = stages.rooms.submit(place, faces, faces, space, params.intersect).result()
 
     made: list[Ref] = [*faces, *rooms, *space]
     for n in used:
         made += [*sent[n].result(), quality[n].result(), streams[n].result()]
         made += [*planes[n].result(), segments[n].result()]
-    return _mapped(request, used, made, skipped, rejected)
+    scans = tuple(UsedScan(n, points[n].result(), segments[n].result()) for n in used)
+    return _mapped(request, scans, made, skipped, rejected)
 
 
 def _rejected(request: StoreyRequest, rated: dict[str, Ref]) -> dict[str, str]:
@@ -147,7 +163,7 @@ def _is_used(name: str, futures: Iterable[PrefectFuture[Any]], skipped: list[Ski
 
 def _mapped(
     request: StoreyRequest,
-    used: list[str],
+    used: tuple[UsedScan, ...],
     made: list[Ref],
     skipped: list[Skipped],
     rejected: dict[str, str],
@@ -166,7 +182,7 @@ def _mapped(
         request.storey,
         read(ROOMS, refs["rooms"][0], store),
         read(WALLS, refs["walls"][0], store),
-        used,
+        [scan.name for scan in used],
         simulated=simulated,
         notes=notes,
     )
@@ -177,10 +193,11 @@ def _mapped(
         tuple(read(QUALITY, ref, store) for ref in refs["quality"]),
         tuple(Skipped(scan, why) for scan, why in rejected.items()),
         {table: sum(ref.rows for ref in of_table) for table, of_table in refs.items()},
+        used,
     )
 
 
-def _message(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
+def ending(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
     """Return what a person should know of how the run ended."""
     reasons = "; ".join(f"{s.scan}: {_without(s.reason, s.scan)}" for s in skipped)
     if mapped is None:

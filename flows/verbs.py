@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flows.answers import print_answers, print_table, state_now
+from flows.assignments import assigned, merged
 from flows.server import prefect_api
 from flows.settings import Settings, load_settings
 from storage.artifacts import check_name
@@ -26,11 +27,11 @@ def map_scans(
     as_json: bool,
 ) -> int:
     """Map the scans of one storey."""
-    flags = _merged(_assigned(assignments), given)
+    flags = merged(assigned(assignments), given)
     settings = load_settings(store=store, jobs=jobs, params=flags or None)
     root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
     for name in (building, storey):
-        _check_name(name)
+        checked_name(name)
     if out is not None:
         writable(out, "folder of the results", "--out")
     with prefect_api(root):
@@ -108,11 +109,11 @@ def simulate_campaign(
         raise MapSenseError("name a plan (GeoJSON or IFC) to scan, or a --preset, and not both")
     if scans is not None and scans < 1:
         raise MapSenseError(f"--scans {scans}: expected at least 1")
-    _check_name(building)
-    assigned = _assigned(assignments)
-    for name in {"scans", "seed"} & set(assigned.get("campaign", {})):
+    checked_name(building)
+    own = assigned(assignments)
+    for name in {"scans", "seed"} & set(own.get("campaign", {})):
         raise MapSenseError(f"--set campaign.{name}: give it as --{name}")
-    given = _merged({"campaign": {"seed": seed}}, assigned)
+    given = merged({"campaign": {"seed": seed}}, own)
     try:
         params = campaign.SimulationParams.model_validate(given)
     except ValidationError as error:
@@ -142,43 +143,6 @@ def simulate_campaign(
     return 0
 
 
-def evaluate_plan(
-    plan: Path,
-    truth: Path,
-    building: str | None,
-    storey: str | None,
-    store: Path | None,
-    assignments: list[str],
-    as_json: bool,
-) -> int:
-    """Score a mapped plan against the truth."""
-    settings = load_settings(store=store, params=_assigned(assignments) or None)
-    root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
-    from storage.plan_geojson import read_plan
-
-    mapped = read_plan(plan)
-    name, level = building or mapped.building, storey or mapped.storey
-    for each in (name, level):
-        _check_name(each)
-    with prefect_api(root):
-        from flows.evaluation import EvaluationRequest
-        from flows.params import parse_params
-        from flows.work import run_evaluation
-
-        request = EvaluationRequest(
-            store=str(root),
-            building=name,
-            storey=level,
-            plan=str(plan.resolve()),
-            truth=str(truth.resolve()),
-            params=parse_params(settings.params),
-        )
-        answers = run_evaluation(request, not as_json)
-    titled = answers if as_json else {f"{name}/{level}: {k}": v for k, v in answers.items()}
-    print_answers(titled, as_json)
-    return 0
-
-
 def charge_campaign(
     folder: Path,
     building: str | None,
@@ -188,13 +152,13 @@ def charge_campaign(
     as_json: bool,
 ) -> int:
     """Charge MapSense, GraMap and No Processing for a campaign's scans."""
-    settings = load_settings(store=store, jobs=jobs, params=_assigned(assignments) or None)
+    settings = load_settings(store=store, jobs=jobs, params=assigned(assignments) or None)
     root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
     from storage.campaign import read_campaign
 
     campaign = read_campaign(folder)
     name = building or f"{campaign.building}.scans"
-    _check_name(name)
+    checked_name(name)
     with prefect_api(root):
         from flows.energy import EnergyRequest
         from flows.params import parse_params
@@ -294,39 +258,10 @@ def _print_summary(summary: dict[str, Any], as_json: bool) -> None:
         print(f"mapsense: {name}: {summary['message']}", file=sys.stderr)
 
 
-def _assigned(assignments: list[str]) -> dict[str, Any]:
-    """Return `hough.gamma_cell=25` and the like as nested parameters."""
-    nested: dict[str, Any] = {}
-    for assignment in assignments:
-        path, found, value = assignment.partition("=")
-        *parents, name = path.strip().split(".")
-        if not found or not parents:
-            raise MapSenseError(
-                f"--set {assignment}: expected STAGE.NAME=VALUE, as hough.gamma_cell=25"
-            )
-        inner = nested
-        for parent in parents:
-            inner = inner.setdefault(parent, {})
-        inner[name] = _value(value)
-    return nested
-
-
-def _value(text: str) -> Any:
-    """Return a value written as JSON, or else the text itself."""
+def checked_name(name: str) -> str:
+    """Return a name that may be a folder of the store, else raise MapSenseError."""
     try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
-
-
-def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    names = {name for name in (*one, *other) if one.get(name) or other.get(name)}
-    return {name: {**one.get(name, {}), **other.get(name, {})} for name in sorted(names)}
-
-
-def _check_name(name: str) -> None:
-    try:
-        check_name(name)
+        return check_name(name)
     except ValueError as error:
         raise MapSenseError(str(error)) from error
 

@@ -12,6 +12,8 @@ from flows import progress
 from flows.building import map_building, with_jobs
 from flows.energy import EnergyRequest, measure_energy
 from flows.evaluation import EvaluationRequest, evaluate_storey
+from flows.experiment import ExperimentRequest, run_experiment
+from flows.outcomes import Outcome, RepeatsFailed
 from flows.request import StoreyRequest
 from flows.server import wait_until_up
 from flows.storey import threads
@@ -80,6 +82,19 @@ def run_evaluation(request: EvaluationRequest, show: bool) -> dict[str, pa.Table
     answers = _answers(request.store, SCORES, place)
     # a storey's plan is of no single scan
     return {title: answer.drop_columns(["scan"]) for title, answer in answers.items()}
+
+
+def run_repeats(request: ExperimentRequest, jobs: int, show: bool) -> list[Outcome]:
+    """Run an experiment; return what came of each repeat, failed ones too."""
+    with _engine(show):
+        at_once: Any = run_experiment.with_options(task_runner=threads(jobs))
+        state = at_once(request, jobs, return_state=True)
+    made = state.result(raise_on_failure=False)
+    if isinstance(made, RepeatsFailed):
+        return made.outcomes
+    _raise_failure(state, request.name)
+    outcomes: list[Outcome] = made
+    return outcomes
 
 
 def _raise_failure(state: Any, what: str) -> None:

@@ -1,0 +1,1 @@
+"""Formal indoor grammars: their form, reader, checks and generator (Sec. 4.2)."""

@@ -1,7 +1,7 @@
 """What was found of what is there, object by object: precision and recall are counts of its rows.
 
 At each threshold an object is in one row: a match, with both ids; missed, with the true id alone;
-or false, with the found id alone.
+or false, with the found id alone. Which plan it was, made with which seed, is the run's to say.
 """
 
 from dataclasses import dataclass
@@ -25,10 +25,6 @@ distance; by the rooms they link."""
 class Detections:
     """n matches, misses and false finds; entry i is one of them in every array."""
 
-    variants: NDArray[np.str_]
-    """(n,), which plan of the storey was compared: initial, final, ...; '' if nobody said"""
-    seeds: NDArray[np.int64]
-    """(n,), seed it was made with; -1 if none is known"""
     simulated: NDArray[np.bool_]
     """(n,), whether the plan, its scans or the truth are simulated"""
     classes: NDArray[np.str_]
@@ -59,8 +55,6 @@ class Detections:
 
 
 _COLUMNS = {
-    "variants": column("variant", pa.string(), "plan compared; '' if nobody said"),
-    "seeds": column("seed", pa.int64(), "seed it was made with; null: unknown", nullable=True),
     "simulated": column("simulated", pa.bool_(), "the plan, its scans or the truth are simulated"),
     "classes": column("class", pa.string(), "room, corner, wall, wall_end, door, window, ..."),
     "metrics": column("metric", pa.string(), ", ".join(METRICS)),
@@ -86,15 +80,14 @@ def to_table(detections: Detections) -> pa.Table:
     for name in _TEXTS:
         texts = table[name].to_pylist()
         table = _with(table, name, pa.array([text or None for text in texts], pa.string()))
-    seeds = detections.seeds
-    return _with(table, "seed", pa.array(seeds, pa.int64(), mask=seeds < 0))
+    return table
 
 
 def from_table(table: pa.Table) -> Detections:
     """Return the rows a table holds."""
     for name in _TEXTS:
         table = _with(table, name, table[name].fill_null(""))
-    return Detections(**from_columns(_with(table, "seed", table["seed"].fill_null(-1)), _COLUMNS))
+    return Detections(**from_columns(table, _COLUMNS))
 
 
 def _with(table: pa.Table, name: str, values: pa.Array | pa.ChunkedArray) -> pa.Table:

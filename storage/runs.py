@@ -4,10 +4,11 @@ import fcntl
 import json
 import os
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,11 @@ ENERGY = "energy"
 """The verb of runs that charge a campaign."""
 EVALUATE = "evaluate"
 """The verb of runs that measure what others made: they are no news of the storey's mapping."""
+DEFAULT = "default"
+"""The variant of a comparison that names none."""
+INITIAL_MODEL = "initial"
+"""The variant that stands for the initial model, where the default's final one differs from it; of
+another variant its name is added before a dot."""
 MAPPED = (COMPLETED, PARTIAL)
 """States that left a plan; of a partial run some scans were skipped."""
 
@@ -40,6 +46,12 @@ class Run:
     ended_at: datetime | None = None
     state: str = RUNNING
     message: str = ""
+    variant: str = ""
+    """name of the method compared; '' of plain mapping"""
+    seed: int | None = None
+    """seed all random stages were given; None: each its own"""
+    parameters: str = ""
+    """what its parameters are known by, seeds aside: `parameter_set`"""
 
     def request(self) -> dict[str, Any]:
         """Return what was asked."""
@@ -56,6 +68,9 @@ SCHEMA = schema(
         column("ended_at", pa.timestamp("us", tz="UTC"), "end; null if it has none", nullable=True),
         column("state", pa.string(), "running, completed, partial (scans skipped) or failed"),
         column("message", pa.string(), "what a person should know of the end; '' if nothing"),
+        column("variant", pa.string(), "method compared; '' of plain mapping"),
+        column("seed", pa.int64(), "seed all random stages were given; null: own", nullable=True),
+        column("parameters", pa.string(), "parameter set, seeds aside"),
     ],
 )
 
@@ -63,6 +78,29 @@ SCHEMA = schema(
 def new_id(now: datetime | None = None) -> str:
     """Return an id that sorts by time."""
     return f"{now or datetime.now(UTC):%Y%m%dT%H%M%S.%f}-{uuid.uuid4().hex[:6]}"
+
+
+def parameter_set(params: Mapping[str, Any]) -> str:
+    """Return what the parameters of a run are known by: repeats differ in their seeds alone.
+
+    Parameters
+    ----------
+    params : mapping
+        Parameters by stage, as JSON; every field named `seed`, at any depth, is left out.
+
+    Returns
+    -------
+    str
+        12 hexadecimal digits.
+    """
+    text = json.dumps(_without_seeds(params), sort_keys=True, separators=(",", ":"))
+    return sha256(text.encode()).hexdigest()[:12]
+
+
+def _without_seeds(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _without_seeds(part) for name, part in value.items() if name != "seed"}
+    return value
 
 
 @dataclass
@@ -124,13 +162,19 @@ def read_runs(
     for path in Path(store).glob(pattern):
         names = dict(part.split("=", 1) for part in path.parts[-3:-1])
         try:
-            rows = pq.read_table(path, columns=SCHEMA.names, partitioning=None).to_pylist()
-        except (OSError, pa.ArrowException) as error:
+            table = pq.read_table(path, partitioning=None)
+            rows = table.drop_columns(_strange(table)).to_pylist()
+            runs += [Run(building=names["building"], storey=names["storey"], **r) for r in rows]
+        except (OSError, pa.ArrowException, TypeError) as error:
             raise StoreError(
                 f"{path}: is no record of a run ({reason(error)}); remove the file"
             ) from error
-        runs += [Run(building=names["building"], storey=names["storey"], **row) for row in rows]
     return sorted(runs, key=lambda run: (run.started_at, run.id))
+
+
+def _strange(table: pa.Table) -> list[str]:
+    """Return columns that are not a run's; one that came later than the file has its default."""
+    return [name for name in table.column_names if name not in SCHEMA.names]
 
 
 def last_runs(runs: list[Run]) -> list[Run]:

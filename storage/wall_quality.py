@@ -14,10 +14,6 @@ from storage.columns import from_columns, to_columns
 class WallQuality:
     """b buffers; entry i is one buffer in every array. Lengths are of wall faces on the plan."""
 
-    variants: NDArray[np.str_]
-    """(b,), which plan of the storey was compared: initial, final, ...; '' if nobody said"""
-    seeds: NDArray[np.int64]
-    """(b,), seed it was made with; -1 if none is known"""
     simulated: NDArray[np.bool_]
     """(b,), whether the plan, its scans or the truth are simulated"""
     buffer_m: NDArray[np.float64]
@@ -38,8 +34,6 @@ class WallQuality:
 
 
 _COLUMNS = {
-    "variants": column("variant", pa.string(), "plan compared; '' if nobody said"),
-    "seeds": column("seed", pa.int64(), "seed it was made with; null: unknown", nullable=True),
     "simulated": column("simulated", pa.bool_(), "the plan, its scans or the truth are simulated"),
     "buffer_m": column("buffer_m", pa.float64(), "greatest distance of two faces that are one"),
     "true_m": column("true_m", pa.float64(), "length of the true faces"),
@@ -59,17 +53,12 @@ SCHEMA = schema("wall_quality", list(_COLUMNS.values()))
 
 def to_table(quality: WallQuality) -> pa.Table:
     """Return one row per buffer."""
-    table = to_columns(quality, _COLUMNS, SCHEMA)
-    seeds = pa.array(quality.seeds, pa.int64(), mask=quality.seeds < 0)
-    return table.set_column(SCHEMA.get_field_index("seed"), SCHEMA.field("seed"), seeds)
+    return to_columns(quality, _COLUMNS, SCHEMA)
 
 
 def from_table(table: pa.Table) -> WallQuality:
     """Return the rows a table holds."""
-    at, seeds = table.schema.get_field_index("seed"), table["seed"].fill_null(-1)
-    return WallQuality(
-        **from_columns(table.set_column(at, table.schema.field("seed"), seeds), _COLUMNS)
-    )
+    return WallQuality(**from_columns(table, _COLUMNS))
 
 
 WALL_QUALITY = register(Kind("wall_quality", WallQuality, SCHEMA, to_table, from_table))

@@ -2,10 +2,11 @@
 with thresholds as (select unnest(range(0, 21)) / 20.0 as t_q),
 judged as (
   select q.building, q.storey, q.p_sum, w.usable, e.error_m2, e.iou
-  from quality q
-  left join scan_work w
+  -- once, however many variants and seeds read it
+  from (select distinct * exclude (run, variant, seed, parameters) from quality) q
+  left join (select distinct * exclude (run, variant, seed, parameters) from scan_work) w
     on w.building = q.building and w.storey = q.storey and w.scan = q.scan
-  left join room_errors e
+  left join (select distinct * exclude (run, variant, seed, parameters) from room_errors) e
     on e.building = q.building and e.storey = q.storey and e.scan = q.scan
   where q.p_sum is not null
 )

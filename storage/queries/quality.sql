@@ -2,5 +2,6 @@
 select building, storey, scan, snapshots, incomplete,
        round(p_in, 3) as p_in, round(p_sk, 3) as p_sk, round(p_sk_worst, 3) as p_sk_worst,
        round(p_sum, 3) as p_sum, t_q, accepted, reason
-from quality
+-- once, however many variants and seeds read it
+from (select distinct * exclude (run, variant, seed, parameters) from quality)
 order by building, storey, accepted nulls first, p_sum desc, scan

@@ -13,8 +13,9 @@ select q.building, q.storey, w.volunteer,
        count(*) filter (w.usable) as usable,
        count(*) filter (w.usable and not q.accepted) as usable_rejected,
        count(*) filter (not w.usable and q.accepted) as unusable_accepted
-from quality q
-left join scan_work w
+-- once, however many variants and seeds read it
+from (select distinct * exclude (run, variant, seed, parameters) from quality) q
+left join (select distinct * exclude (run, variant, seed, parameters) from scan_work) w
   on w.building = q.building and w.storey = q.storey and w.scan = q.scan
 group by q.building, q.storey, w.volunteer
 order by q.building, q.storey, w.volunteer nulls last

@@ -1,5 +1,5 @@
 -- the twenty rooms whose area was worst, of all plans ever compared; one not found errs by all of it
-with rooms as (
+with compared as (
   -- a plan compared again with other thresholds is there twice
   select distinct building, storey, scan, variant, seed, simulated, true_id, true_class,
          true_m2, found_m2, value, abs(true_m2 - coalesce(found_m2, 0)) as error_m2
@@ -11,6 +11,6 @@ select building, storey, scan, variant, seed, simulated, true_id as room, true_c
        round(found_m2, 3) as found_m2,
        round(error_m2, 3) as error_m2,
        round(value, 4) as iou
-from rooms
-order by rooms.error_m2 desc, building, storey, scan, variant, seed, room
+from compared
+order by compared.error_m2 desc, building, storey, scan, variant, seed, room
 limit 20

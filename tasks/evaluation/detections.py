@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeInt, PositiveFloat
+from pydantic import Field, PositiveFloat
 
 from storage import detections as stored
 from storage.detections import Detections
@@ -37,10 +37,6 @@ Part = dict[str, NDArray[Any]]
 class EvaluationParams(Params):
     """What counts as found."""
 
-    variant: str = ""
-    """Which plan of the storey is compared: initial, final, ... Not in the paper."""
-    seed: NonNegativeInt | None = None
-    """Seed it was made with; None: unknown. Not in the paper."""
     room_iou: tuple[Share, ...] = (0.0, 0.5)
     """IoU of two rooms to be exceeded: 0 for the error of areas (Sec. 7.3), which must not leave
     the worst rooms out; 0.5 as Floor-SP and RoomFormer."""
@@ -88,14 +84,10 @@ def detect(found: Plan, truth: Plan, params: EvaluationParams) -> Detections:
         *_furniture(found, truth, params),
     ]
     n = sum(len(part["classes"]) for part in parts)
-    columns = {
-        "variants": np.full(n, params.variant),
-        "seeds": np.full(n, -1 if params.seed is None else params.seed, np.int64),
-        "simulated": np.full(n, found.simulated or truth.simulated),
-    }
-    names = [field.name for field in fields(Detections) if field.name not in columns]
+    simulated = np.full(n, found.simulated or truth.simulated)
+    names = [field.name for field in fields(Detections) if field.name != "simulated"]
     joined = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    return Detections(**columns, **joined)
+    return Detections(simulated=simulated, **joined)
 
 
 def _rooms(found: Plan, truth: Plan, params: EvaluationParams) -> list[Part]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pydantic import NonNegativeInt, PositiveFloat
+from pydantic import PositiveFloat
 from shapely import LineString, STRtree
 
 from storage.plan import Plan, PlanWall
@@ -20,10 +20,6 @@ from tasks.params import Params
 class WallQualityParams(Params):
     """What is compared, and how near two faces are one."""
 
-    variant: str = ""
-    """Which plan of the storey is compared: initial, final, ... Not in the paper."""
-    seed: NonNegativeInt | None = None
-    """Seed it was made with; None: unknown. Not in the paper."""
     buffers_m: tuple[PositiveFloat, ...] = (0.1,)
     """Buffer b and cut-off r, metres (ISPRS benchmark on indoor modelling: b = r = 10 cm)."""
     sample_m: PositiveFloat = 0.02
@@ -83,8 +79,6 @@ def compare_walls(found: Plan, truth: Plan, params: WallQualityParams) -> WallQu
     apart = _distances(true, mapped, max(params.buffers_m, default=0.0), params.sample_m)
     near = [apart[apart <= buffer] for buffer in params.buffers_m]
     return WallQuality(
-        variants=np.full(n, params.variant),
-        seeds=np.full(n, -1 if params.seed is None else params.seed, np.int64),
         simulated=np.full(n, found.simulated or truth.simulated),
         buffer_m=np.array(params.buffers_m, float),
         true_m=np.full(n, true_m),

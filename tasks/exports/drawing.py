@@ -42,13 +42,8 @@ def draw_plan(
     StoreError
         If a file cannot be written.
     """
-    sheet = new_sheet(_bounds(plan, coverage))
-    _draw_rooms(sheet, plan)
-    if coverage is not None:
-        _draw_coverage(sheet, plan, coverage)
-    _draw_walls(sheet, plan)
-    _draw_openings(sheet, plan)
-    _draw_furniture(sheet, plan)
+    sheet = new_sheet(bounds(plan, coverage))
+    draw_storey(sheet, plan, coverage)
     _draw_labels(sheet, plan)
     draw_title(sheet, plan)
     draw_footer(sheet, plan, covered=coverage is not None and len(coverage.scans) > 0)
@@ -56,7 +51,17 @@ def draw_plan(
     save(sheet, path_png)
 
 
-def _bounds(plan: Plan, coverage: Coverage | None) -> tuple[float, float, float, float]:
+def draw_storey(sheet: Sheet, plan: Plan, coverage: Coverage | None) -> None:
+    """Draw rooms, walls, openings and furniture, without a word."""
+    _draw_rooms(sheet, plan)
+    if coverage is not None:
+        _draw_coverage(sheet, plan, coverage)
+    _draw_walls(sheet, plan)
+    _draw_openings(sheet, plan)
+    _draw_furniture(sheet, plan)
+
+
+def bounds(plan: Plan, coverage: Coverage | None) -> tuple[float, float, float, float]:
     """Return low x, y and high x, y of what is drawn, metres."""
     areas = [room.polygon for room in plan.rooms]
     areas += [wall.line.buffer((wall.thickness_m or 0) / 2) for wall in plan.walls]

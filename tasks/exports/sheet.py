@@ -106,16 +106,21 @@ def new_sheet(bounds: tuple[float, float, float, float]) -> Sheet:
 
 def save(sheet: Sheet, path: Path | str) -> None:
     """Write the sheet in the format of the path's suffix, all of it or nothing, undated."""
+    path = Path(path)
+    write_whole(path, rendered(sheet.figure, path.suffix.lower()), "drawing")
+
+
+def rendered(figure: "Figure", suffix: str) -> bytes:
+    """Return a figure as the bytes of an `.svg` or `.png` file: undated, the same each time."""
     import matplotlib
 
-    path, data = Path(path), BytesIO()
+    data = BytesIO()
     metadata = {".svg": {"Date": None, "Creator": "MapSense"}, ".png": {"Software": None}}
     settings = {"svg.hashsalt": "mapsense", "svg.fonttype": "path"}
     # the settings are matplotlib's own and global: one drawing at a time
     with _save_lock, matplotlib.rc_context(settings):
-        suffix = path.suffix.lower()
-        sheet.figure.savefig(data, format=suffix[1:], dpi=DPI, metadata=metadata[suffix])
-    write_whole(path, data.getvalue(), "drawing")
+        figure.savefig(data, format=suffix[1:], dpi=DPI, metadata=metadata[suffix])
+    return data.getvalue()
 
 
 def text_width(text: str, size_pt: float) -> float:

@@ -1,11 +1,11 @@
-"""Map every real scan set beside the project as a user would, and score it where there is truth.
+"""Map every real scan set beside the project as a user would: each reader, with or without truth.
 
     python tests/benchmarks/real_scans.py [--data DIR] [--out DIR]
 
 Prints a row per set: points, seconds of each stage (without compilation: the first set is mapped
-once before to warm up), peak memory, planes, walls and rooms found, and against truth read off the
-scans by hand: precision, recall and F1 of rooms matched one to one at IoU 0.5, and the share of
-the wall faces' length within 15 cm of a found outline. Data that is not there is left out.
+once before to warm up), peak memory, planes, walls and rooms found. With --out, plans and pictures
+stay there to be looked at. Data that is not there is left out. What is found of what is there,
+`results.py` says.
 """
 
 import argparse
@@ -17,11 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import shapely
-
-from tasks.evaluation.rooms import ious, match
-
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 STAGES = (
     *("clouds", "quality", "voxels", "streams"),
@@ -31,23 +26,17 @@ STAGES = (
 
 @dataclass(frozen=True)
 class ScanSet:
-    """One thing to map: its files below the data folder, flags, and where its truth lies."""
+    """One thing to map: its files below the data folder, and flags."""
 
     name: str
     paths: tuple[str, ...]
     flags: tuple[str, ...] = ()
-    truth: str | None = None
 
 
 SETS = (
-    ScanSet("tls_office_1", ("tls_office_1/sample2_aligned.ply",), (), "tls_office_1/truth.json"),
-    ScanSet("tls_office_1_raw", ("tls_office_1/sample2_raw.ply",), (), "tls_office_1/truth.json"),
-    ScanSet(
-        "freiburg_079",
-        ("freiburg_079_floor/fr_079_occupied.ply",),
-        (),
-        "freiburg_079_floor/truth.json",
-    ),
+    ScanSet("tls_office_1", ("tls_office_1/sample2_aligned.ply",)),
+    ScanSet("tls_office_1_raw", ("tls_office_1/sample2_raw.ply",)),
+    ScanSet("freiburg_079", ("freiburg_079_floor/fr_079_occupied.ply",)),
     ScanSet("pcl_room_1", ("pcl_room_scans/room_scan1.pcd",)),
     ScanSet("pcl_room_2", ("pcl_room_scans/room_scan2.pcd",)),
     ScanSet("ipad_430_db", ("ipad_lidar_ceilings/pix4d_database_430_db.ply",)),
@@ -91,7 +80,7 @@ def _row(scan_set: ScanSet, data: Path, out: Path, scratch: Path) -> dict[str, A
     summary = _map(scan_set, data, out, store)
     stages = summary.get("stages", {})
     rows = summary.get("found", {}).get("rows", {})
-    row: dict[str, Any] = {
+    return {
         "set": scan_set.name,
         "state": summary["state"],
         "points": summary.get("used", {}).get("points", 0),
@@ -103,9 +92,6 @@ def _row(scan_set: ScanSet, data: Path, out: Path, scratch: Path) -> dict[str, A
         "floor_m": summary.get("found", {}).get("floor_m"),
         "ceiling_m": summary.get("found", {}).get("ceiling_m"),
     }
-    if scan_set.truth is not None and summary["state"] == "completed":
-        row |= score(out / scan_set.name / "plan.geojson", data / scan_set.truth, scan_set.name)
-    return row
 
 
 def _map(scan_set: ScanSet, data: Path, out: Path, store: Path) -> dict[str, Any]:
@@ -130,40 +116,6 @@ def _peak(storey: str, store: Path) -> float:
     command += ["--store", str(store), "--format", "json"]
     answer = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
     return round(answer[0]["mb"] or 0.0)
-
-
-def score(plan: Path, truth_file: Path, name: str) -> dict[str, Any]:
-    """Score a plan's rooms and outlines against truth read off the scan.
-
-    The raw scan's plan is brought into the truth's frame by the stated matrix, not by fitting.
-    """
-    truth = json.loads(truth_file.read_text())
-    features = json.loads(plan.read_text())["features"]
-    found = [shapely.geometry.shape(f["geometry"]) for f in features
-             if f["properties"]["kind"] == "room"]  # fmt: skip
-    if name.endswith("_raw"):
-        matrix = np.array(truth["raw_to_aligned"])
-        found = [shapely.transform(p, lambda xy: xy @ matrix[:2, :2].T + matrix[:2, 3])
-                 for p in found]  # fmt: skip
-    rooms = [shapely.Polygon(r["polygon"]) for r in truth["rooms"]]
-    overlap = ious(found, rooms)
-    best = np.append(overlap, np.zeros((1, len(rooms))), axis=0)[match(overlap), range(len(rooms))]
-    hits = int((best > 0.5).sum())
-    pieces = truth.get("room_faces") or truth["walls"]
-    outlines = shapely.union_all([p.exterior for p in found])
-    near = length = 0.0
-    for piece in pieces:
-        line = shapely.LineString([piece["p0"], piece["p1"]])
-        places = np.linspace(0, line.length, max(3, int(line.length / 0.05)))
-        away = shapely.distance(shapely.line_interpolate_point(line, places), outlines)
-        near += line.length * float((away < 0.15).mean())
-        length += line.length
-    return {
-        "precision": round(hits / max(len(found), 1), 2),
-        "recall": round(hits / len(rooms), 2),
-        "f1": round(2 * hits / (len(found) + len(rooms)), 2),
-        "faces_15cm": round(near / length, 2),
-    }
 
 
 def _show(rows: list[dict[str, Any]]) -> None:

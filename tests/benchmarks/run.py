@@ -15,11 +15,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from catalog import catalog
 from codec import codec
 from planes import planes
 from readers import memory, readers
 from report import Report, machine
 from storey import storey
+from viterbi import viterbi
 from voxels import voxels
 
 SECTIONS: dict[str, Callable[[bool], Report]] = {
@@ -28,10 +30,12 @@ SECTIONS: dict[str, Callable[[bool], Report]] = {
     "readers": readers,
     "voxels": voxels,
     "codec": codec,
+    "viterbi": viterbi,
     "memory": memory,
+    "catalog": catalog,
 }
 """A section takes `quick` and returns its report. A new one is added here."""
-ON_REQUEST = ("memory",)
+ON_REQUEST = ("memory", "catalog")
 """Sections that run only when named."""
 
 

@@ -8,10 +8,13 @@ import pytest
 from shapely import LineString, box
 
 from flows.cli import main
+from flows.params import MapSenseParams
 from storage.catalog import run_query
 from storage.plan import Plan, PlanRoom, PlanWall
-from storage.plan_geojson import write_plan
-from storage.runs import last_runs, read_runs
+from storage.plan_geojson import read_plan, write_plan
+from storage.runs import last_runs, parameter_set, read_runs
+
+SUFFIXES = ("geojson", "json")
 
 
 def mapsense(*arguments):
@@ -80,6 +83,31 @@ def test_scoring_again_computes_nothing(folder):
         "where run = (select max(id) from runs) group by all",
     )
     assert outcomes.to_pylist() == [{"outcome": "cached", "n": 2}]
+
+
+def test_a_truth_that_is_no_geojson_file_is_kept_as_one_and_scored_alike(folder):
+    (folder / "truth.json").write_bytes((folder / "truth.geojson").read_bytes())
+    asked = (folder / "plan.geojson", "--store", folder / "other", "--json")
+    codes, answers, _ = zip(
+        *(mapsense("evaluate", *asked, "--truth", folder / f"truth.{end}") for end in SUFFIXES),
+        strict=True,
+    )
+    assert codes == (0, 0)
+    assert answers[0] == answers[1]
+    (kept,) = (folder / "other" / "truths").iterdir()
+    assert kept.suffix == ".geojson"
+    assert [room.polygon for room in read_plan(kept).rooms] == [
+        room.polygon for room in read_plan(folder / "truth.geojson").rooms
+    ]
+
+
+def test_a_run_says_what_its_parameters_are_known_by(folder):
+    evaluate(folder)
+    evaluate(folder, "--set", "evaluation.off_wall_m=0.4")
+    *_, one, other = read_runs(folder / "store")
+    assert one.parameters == parameter_set(MapSenseParams().model_dump(mode="json"))
+    assert other.parameters != one.parameters
+    assert {(run.variant, run.seed) for run in (one, other)} == {("", None)}
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"no JSON"])

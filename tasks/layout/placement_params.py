@@ -1,0 +1,39 @@
+"""How decoded rooms are placed."""
+
+from typing import Literal
+
+from pydantic import Field, PositiveFloat
+
+from tasks.params import Params
+
+
+class PlacementParams(Params):
+    """How decoded rooms are placed. Not in the paper unless said; figures are assumptions."""
+
+    widths: Literal["fuse", "replace", "observed"] = "fuse"
+    """Observed and rule widths fused by their uncertainty; or the rule's replaces the observed
+    (the paper's); or the observed stays."""
+    limit: PositiveFloat = 3.0
+    """The guard: standard deviations from which a rule contradicts what was observed."""
+    most_wrong: float = Field(default=0.5, ge=0, le=1)
+    """The guard: share of the rules between well-observed walls that may contradict these before no
+    rule is trusted."""
+    firm_presence: float = Field(default=0.9, ge=0, le=1)
+    """Presence from which a wall whose two faces were seen counts as well observed."""
+    cut_posterior: float = Field(default=0.8, ge=0, le=1)
+    """Posterior that all rooms of a room to be cut need: on the presets, decoded by a grammar of
+    another building, wrong cuts had up to 0.77."""
+    face_sigma_m: PositiveFloat = 0.03
+    """Standard deviation of a wall's face seen along all its length, metres."""
+    end_sigma_m: PositiveFloat = 0.05
+    """Standard deviation of where a line ends, metres: the axis of a wall seen from one side."""
+    on_wall_m: PositiveFloat = 0.15
+    """A room's side this near to an observed face lies on it, metres."""
+    align_m: PositiveFloat = 0.12
+    """Rooms whose fronts or backs differ by no more share one straight wall, metres."""
+    thickest_m: PositiveFloat = 0.5
+    """Rooms further apart are no neighbours, metres."""
+    thinnest_m: PositiveFloat = 0.02
+    """No wall is made thinner than this, metres."""
+    least_room_m2: PositiveFloat = 1.0
+    """No room is cut into smaller ones, square metres."""
