@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from grammars.learning import learn
+from grammars.generator.learning import learn
+from grammars.generator.params import LearnParams
 from grammars.model import Grammar
-from grammars.params import LearnParams
 from storage.errors import InputError
 from storage.plan import Plan
 

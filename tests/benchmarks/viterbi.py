@@ -12,9 +12,9 @@ from report import Column, Report, Table, Target
 
 from grammars.model import Grammar, Part, Rule
 from storage.observations import Observations
-from tasks.layout.decode import DecodeParams, decode
-from tasks.layout.hmm import Model
-from tasks.layout.hmm import viterbi as decode_lines
+from tasks.layout.decoding.decode import DecodeParams, decode
+from tasks.layout.decoding.hmm import Model
+from tasks.layout.decoding.hmm import viterbi as decode_lines
 
 OURS, HMMLEARN = "ours", "hmmlearn"
 SIZES = ((12, 20, 40), (50, 30, 200), (200, 100, 1000))

@@ -1,0 +1,214 @@
+"""Find the sequence of rooms along each reference line (Sec. 4.2.2, Fig. 8)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PositiveInt
+
+from grammars.model import Grammar
+from storage.layout import HIDDEN, LINE_END, Layout
+from storage.observations import Observations
+from tasks.layout.decoding.kbest import best_decodings, rooms_of
+from tasks.layout.decoding.plain import PlainParams, best_rules, make_plain, rule_rooms
+from tasks.layout.decoding.posterior import posterior, room_posteriors
+from tasks.layout.decoding.segmental import SegmentalParams, make_segmental, make_walls
+from tasks.layout.decoding.states import States, Unexplained, Units, make_states
+from tasks.layout.decoding.transitions import Transitions, transition_matrix
+from tasks.params import Params
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class DecodeParams(Params):
+    """How rules are found along a line."""
+
+    decoder: Literal["segmental", "plain"] = "segmental"
+    """Segmental: walls may be missed or imagined. Plain: the paper's hidden Markov model, one rule
+    for each observed width."""
+    transitions: Transitions = "conditional"
+    """How rules follow each other: the relationship probability, or Eq. 9."""
+    smoothing: float = Field(default=0.02, ge=0, le=1)
+    """Share of the a-priori probabilities mixed into the relationship probabilities. Assumption."""
+    units: Units = "kept"
+    """Whether the rooms of a unit come together or, split, each by itself."""
+    unexplained: Literal["allowed", "forbidden"] = "allowed"
+    """Whether the segmental decoder may leave a room to the data that no rule explains."""
+    p_unexplained: float = Field(default=0.02, gt=0, lt=1)
+    """Probability that an unexplained room follows one of a rule. Assumption."""
+    p_unexplained_again: float = Field(default=0.5, gt=0, lt=1)
+    """Probability that another follows. Assumption."""
+    hypotheses: PositiveInt = 3
+    """Sequences of each line that the segmental decoder returns at most, the best first."""
+    plain: PlainParams = PlainParams()
+    """The paper's model."""
+    segmental: SegmentalParams = SegmentalParams()
+    """How walls are seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """One line's share of the observations."""
+
+    id: str
+    length: float
+    cuts: Floats
+    sigmas: Floats
+    presence: Floats
+    depths: Floats
+    rooms: Ints
+
+    @property
+    def bounds(self) -> Floats:
+        """Ends and cuts."""
+        return np.concatenate([[0.0], self.cuts, [self.length]])
+
+
+@dataclass(frozen=True, eq=False)
+class _Sequence:
+    """The rooms of one hypothesis of a line."""
+
+    line: str
+    hypothesis: int
+    states: Ints
+    """(m,), -1 unexplained"""
+    bounds: Floats
+    """(m + 1,)"""
+    cuts: Ints
+    """(m + 1,)"""
+    posteriors: Floats
+    """(m,)"""
+    log_p: float
+
+
+def decode(observations: Observations, grammar: Grammar, params: DecodeParams) -> Layout:
+    """Find the sequence of rooms along each reference line.
+
+    Parameters
+    ----------
+    observations : Observations
+        Walls seen along the lines of a storey.
+    grammar : Grammar
+        Its rules' widths run between the centres of walls, as the observations do.
+
+    Returns
+    -------
+    Layout
+        Of each line the best sequence and, of the segmental decoder, the next best. The rooms of a
+        line that no sequence explains are those observed, unexplained, with log probability -inf.
+
+    Raises
+    ------
+    MapSenseError
+        If the grammar has too many ways to fill a gap; the message says what to change.
+    """
+    matrix = transition_matrix(
+        grammar.p_apriori, grammar.p_relation, params.transitions, params.smoothing
+    )
+    lines = list(_lines(observations))
+    if params.decoder == "plain":
+        states = make_states(grammar, matrix, params.units, None)
+        return _layout(list(_plain(lines, states, params)), states)
+    unexplained = Unexplained(params.p_unexplained, params.p_unexplained_again)
+    states = make_states(
+        grammar, matrix, params.units, unexplained if params.unexplained == "allowed" else None
+    )
+    return _layout(list(_segmental(lines, states, params)), states)
+
+
+def _lines(observations: Observations) -> Iterator[_Line]:
+    for i, length in enumerate(observations.lengths_m):
+        cuts, intervals = observations.lines == i, observations.interval_lines == i
+        yield _Line(
+            str(observations.line_ids[i]),
+            float(length),
+            observations.cut_m[cuts],
+            observations.sigma_m[cuts],
+            observations.presence[cuts],
+            observations.depth_m[intervals],
+            observations.rooms[intervals],
+        )
+
+
+def _segmental(lines: list[_Line], states: States, params: DecodeParams) -> Iterator[_Sequence]:
+    model = make_segmental(states, params.segmental)
+    for line in lines:
+        walls = make_walls(
+            model, line.length, line.cuts, line.sigmas, line.presence, line.depths, line.rooms
+        )
+        sums = posterior(model, walls)
+        decodings = best_decodings(model, walls, params.hypotheses)
+        for i, decoding in enumerate(decodings):
+            rooms = rooms_of(model, walls, decoding)
+            p = room_posteriors(model, walls, decoding, sums)
+            found = np.where(rooms.states < states.explained, rooms.states, -1)
+            yield _Sequence(line.id, i, found, rooms.bounds_m, rooms.cuts, p, decoding.log_p)
+        if not decodings:
+            yield _as_observed(line)
+
+
+def _plain(lines: list[_Line], states: States, params: DecodeParams) -> Iterator[_Sequence]:
+    plain = make_plain(states, params.plain)
+    widths = [np.diff(line.bounds) for line in lines]
+    lengths = np.array([line.length for line in lines])
+    for line, observed, path, log_p in zip(
+        lines, widths, *best_rules(plain, widths, lengths), strict=True
+    ):
+        if log_p == -np.inf:
+            yield _as_observed(line)
+            continue
+        found = rule_rooms(plain, states, observed, path)
+        bounds, cuts = [line.bounds[:1]], [np.array([LINE_END])]
+        for i, (rooms, shares, _) in enumerate(found):
+            bounds += [
+                line.bounds[i] + observed[i] * np.cumsum(shares)[:-1],
+                line.bounds[i + 1, None],
+            ]
+            end = LINE_END if i == len(found) - 1 else i
+            cuts += [np.full(len(rooms) - 1, HIDDEN), np.array([end])]
+        rooms, posteriors = (np.concatenate([f[k] for f in found]) for k in (0, 2))
+        yield _Sequence(
+            line.id, 0, rooms, np.concatenate(bounds), np.concatenate(cuts), posteriors, log_p
+        )
+
+
+def _as_observed(line: _Line) -> _Sequence:
+    count = len(line.cuts) + 1
+    cuts = np.concatenate([[LINE_END], np.arange(count - 1), [LINE_END]])
+    none = np.full(count, -1)
+    return _Sequence(line.id, 0, none, line.bounds, cuts, np.zeros(count), -np.inf)
+
+
+def _layout(sequences: list[_Sequence], states: States) -> Layout:
+    """Return the rows of sequences of rooms."""
+    counts = [len(s.states) for s in sequences]
+    at = _joined([s.states for s in sequences], np.int64)
+    # the row at -1 is the unexplained room's
+    ids = np.array([*states.rules[: states.explained], ""], np.str_)
+    classes = np.array([*states.classes[: states.explained], ""], np.str_)
+    parts = np.append(states.parts[: states.explained], 0)
+    widths = np.append(states.widths[: states.explained], np.nan)
+    spreads = np.append(states.spreads[: states.explained], np.nan)
+    return Layout(
+        line_ids=np.repeat(np.array([s.line for s in sequences], np.str_), counts),
+        hypotheses=np.repeat(np.array([s.hypothesis for s in sequences], np.int64), counts),
+        orders=_joined([np.arange(n) for n in counts], np.int64),
+        from_m=_joined([s.bounds[:-1] for s in sequences], np.float64),
+        to_m=_joined([s.bounds[1:] for s in sequences], np.float64),
+        from_cuts=_joined([s.cuts[:-1] for s in sequences], np.int64),
+        to_cuts=_joined([s.cuts[1:] for s in sequences], np.int64),
+        classes=classes[at],
+        rules=ids[at],
+        parts=parts[at],
+        widths_m=widths[at],
+        spreads_m=spreads[at],
+        posteriors=_joined([s.posteriors for s in sequences], np.float64),
+        log_p=np.repeat(np.array([s.log_p for s in sequences], np.float64), counts),
+    )
+
+
+def _joined(arrays: list[NDArray[Any]], dtype: type) -> NDArray[Any]:
+    return np.concatenate([np.empty(0, dtype), *arrays]).astype(dtype)

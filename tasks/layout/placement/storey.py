@@ -1,0 +1,54 @@
+"""What a storey's final plan is made from."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from grammars.model import Grammar
+from storage.layout import Layout
+from storage.walls import Walls
+from tasks.layout.placement.decoded_rows import DecodedRow, main_rows
+from tasks.layout.placement.params import PlacementParams
+from tasks.layout.placement.validity import overlap_m2
+
+
+@dataclass(frozen=True, eq=False)
+class Storey:
+    """The initial model, what was decoded along its lines, and how to place that."""
+
+    initial: list[Polygon]
+    """outlines of the initial rooms"""
+    walls: Walls
+    rows: list[DecodedRow]
+    layout: Layout
+    grammar: Grammar
+    params: PlacementParams
+
+    @cached_property
+    def overlap_m2(self) -> NDArray[np.float64]:
+        """By how much the initial rooms overlap, (n, n)."""
+        return overlap_m2(self.initial)
+
+    @cached_property
+    def main_rows(self) -> NDArray[np.int64]:
+        """The row that each initial room stands on longest, (n,), -1 for none."""
+        return main_rows(self.rows, len(self.initial))
+
+    def posteriors(self, row: int) -> NDArray[np.float64]:
+        """Return the posterior of each room of a row."""
+        return self.layout.posteriors[self.rows[row].decoded]
+
+    def rule_depth_m(self, row: int, rooms: list[int]) -> tuple[float, float]:
+        """Return the mean depth and spread by the rules of some rooms of a row, NaN for any."""
+        parts = {(r.id, i): part for r in self.grammar.rules for i, part in enumerate(r.parts)}
+        known = []
+        for decoded in self.rows[row].decoded[rooms]:
+            key = (str(self.layout.rules[decoded]), int(self.layout.parts[decoded]))
+            part = parts.get(key)
+            if part is not None and part.depth_m is not None and part.depth_spread_m is not None:
+                known.append((part.depth_m, part.depth_spread_m))
+        depth, spread = np.mean(known, axis=0) if known else (np.nan, np.nan)
+        return float(depth), float(spread)
