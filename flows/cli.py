@@ -55,6 +55,10 @@ def map_(
     out: Annotated[
         Path | None, Parameter(help="Folder of the results. [default: in the store]")
     ] = None,
+    grammar: Annotated[
+        str | None,
+        Parameter(help="Grammar that corrects the model: a file, or a name as office."),
+    ] = None,
     set_: Set = None,
     up: Annotated[
         str | None,
@@ -86,7 +90,11 @@ def map_(
     if box is not None and len(box) != 6:
         raise MapSenseError(f"--crop {crop}: expected xmin,ymin,zmin,xmax,ymax,zmax, metres")
     own: dict[str, Any] = {"up": up, "scale": scale, "crop": box}
-    given = {"scans": {name: value for name, value in own.items() if value is not None}}
+    given: dict[str, Any] = {
+        "scans": {name: value for name, value in own.items() if value is not None}
+    }
+    if grammar is not None:
+        given["grammar"] = grammar
     from flows.verbs import map_scans
 
     return map_scans(scans, building, storey, store, out, set_ or [], given, jobs, json)
@@ -235,6 +243,80 @@ def evaluate(
     from flows.scoring import evaluate as score
 
     return score(what, truth, truth_storey, building, storey, seeds, store, set_ or [], jobs, json)
+
+
+grammar_app = App(name="grammar", help="Indoor grammars: learn, show and check them.")
+app.command(grammar_app)
+
+
+@grammar_app.command
+def learn(
+    *plans: Annotated[Path, Parameter(help="Known plans: GeoJSON or IFC files.")],
+    out: Annotated[Path, Parameter(name=["--out", "-o"], help="File of the grammar, TOML.")],
+    storey: Annotated[str | None, Parameter(help="Storey of an IFC file. [default: all]")] = None,
+    name: Annotated[str | None, Parameter(help="Its name. [default: the file's]")] = None,
+    building_type: Annotated[
+        str, Parameter(name="--type", help="Kind of building it is for.")
+    ] = "unknown",
+    set_: Annotated[
+        list[str] | None,
+        Parameter(name="--set", negative=(), help="A parameter, as learn.spread_floor_m=0.02."),
+    ] = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Learn a grammar from known plans of a building, or of buildings of its kind.
+
+    For example
+
+    ```
+    mapsense grammar learn level1.geojson level3.geojson --out library.toml
+    ```
+    """
+    from flows.grammar import learn_grammar
+
+    return learn_grammar(plans, out, storey, name or out.stem, building_type, set_ or [])
+
+
+@grammar_app.command
+def show(
+    grammar: Annotated[str, Parameter(help="A file, or the name of one that comes along.")],
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(help="Folder of its drawing, SVG and PNG.")] = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Show a grammar's rules and how they follow each other; with --out, draw them.
+
+    For example
+
+    ```
+    mapsense grammar show office --out office
+    ```
+    """
+    from flows.grammar import show_grammar
+
+    return show_grammar(grammar, out)
+
+
+@grammar_app.command
+def check(
+    *grammars: Annotated[str, Parameter(help="Files, or names of those that come along.")],
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Check grammars: what is wrong is named with file, line and field.
+
+    For example
+
+    ```
+    mapsense grammar check library.toml
+    ```
+    """
+    from flows.grammar import check_grammars
+
+    return check_grammars(grammars)
 
 
 @app.command

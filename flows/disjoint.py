@@ -5,6 +5,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from grammars.library import find_grammar
+from grammars.reading import read_grammar
 from storage.errors import InputError
 from storage.plan_digest import plan_digest
 from tasks.evaluation.truth import read_truth
@@ -49,14 +51,27 @@ def learnt_from(path: Path) -> Learnt:
     return Learnt(building=plan.building, storey=plan.storey, source=str(path), digest=digest)
 
 
-def check_disjoint(learnt: Sequence[Learnt], scored: Iterable[ScoredStorey]) -> None:
+def learnt_by(grammar: str) -> list[Learnt]:
+    """Return the storeys a grammar was learnt from, as it says itself."""
+    path = find_grammar(grammar)
+    return [
+        Learnt(building=o.building, storey=o.storey, source=str(path), digest=o.digest)
+        for o in read_grammar(path).learnt_from
+    ]
+
+
+def check_disjoint(scored: Iterable[tuple[ScoredStorey, Sequence[Learnt]]]) -> None:
     """Raise InputError if a storey is scored twice, or is one that was learnt from.
+
+    Parameters
+    ----------
+    scored : each storey with what was learnt from by all that it is mapped with
 
     Storeys are the same if they are called the same, by the experiment or by their plans, or if
     their plans have the same rooms, whatever they are called.
     """
     seen: set[tuple[str, str]] = set()
-    for storey in scored:
+    for storey, learnt in scored:
         name = (storey.building, storey.storey)
         if name in seen:
             problem = f"there are two storeys '{storey.building}/{storey.storey}' to be scored"

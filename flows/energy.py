@@ -1,25 +1,23 @@
 """What a campaign costs its devices: MapSense, GraMap and No Processing on the same scans."""
 
 from collections.abc import Iterable
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from prefect import flow
 from prefect.futures import PrefectFuture
-from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from flows import progress, stages
-from flows.params import MapSenseParams
 from flows.plans import plan_source
+from flows.request import Request
 from flows.storey import threads
-from storage.artifacts import Place, check_name, read
+from storage.artifacts import Place, read
 from storage.campaign import FILE, CampaignScan, CampaignStorey, read_campaign
 from storage.errors import InputError
 from storage.plan_geojson import read_plan
 from storage.quality import QUALITY
 from storage.room_errors import ROOM_ERRORS
-from storage.runs import COMPLETED, ENERGY, PARTIAL, Run, new_id, parameter_set, recorded
+from storage.runs import COMPLETED, ENERGY, PARTIAL, recorded
 from storage.sources import Source
 from storage.streams import STREAMS
 from tasks.device.codec import CodecParams
@@ -35,30 +33,14 @@ WHOLE = "campaign"
 """Stands for a storey where all of them together are meant."""
 
 
-class EnergyRequest(BaseModel):
-    """Charge the methods for the scans of a campaign."""
+class EnergyRequest(Request):
+    """Charge the methods for the scans of a campaign.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    Its results are kept under a building's name of their own: each scan is mapped alone here.
+    """
 
-    store: str
-    """Folder of the store."""
     folder: str
     """Folder of the campaign."""
-    building: str
-    """Name its results are kept under: of its own, for each scan is mapped alone here."""
-    params: MapSenseParams = MapSenseParams()
-    """Parameters of the stages."""
-    run: str = Field(default_factory=new_id)
-    """Id of the run."""
-
-    @field_validator("building")
-    @classmethod
-    def _is_a_name(cls, value: str) -> str:
-        return check_name(value)
-
-    def place(self, storey: str) -> Place:
-        """Return the place of a storey."""
-        return Place(store=self.store, run=self.run, building=self.building, storey=storey)
 
 
 @flow(name=ENERGY, flow_run_name="{request.building}", task_runner=threads())
@@ -70,8 +52,8 @@ def measure_energy(request: EnergyRequest) -> None:
         problem = f"a storey is called '{WHOLE}', which stands for all of them"
         raise InputError(Path(request.folder) / FILE, problem, "give the storey another name")
     tallies = [row for storey in campaign.storeys for row in _storey(request, storey)]
-    place = request.place(WHOLE)
-    with recorded(request.store, _run(request, WHOLE)) as record:
+    place = request.place_of(WHOLE)
+    with recorded(request.store, request.begun(ENERGY, WHOLE)) as record:
         work = stages.scan_work(place, params.work.model_copy(update={"scans": tuple(tallies)}))
         energy = stages.energy(place, work, params.energy)
         stages.savings(place, energy)
@@ -80,27 +62,15 @@ def measure_energy(request: EnergyRequest) -> None:
         record.end(COMPLETED, "")
 
 
-def _run(request: EnergyRequest, storey: str) -> Run:
-    return Run(
-        id=request.run,
-        verb=ENERGY,
-        building=request.building,
-        storey=storey,
-        asked=request.model_dump_json(),
-        started_at=datetime.now(UTC),
-        parameters=parameter_set(request.params.model_dump(mode="json")),
-    )
-
-
 def _storey(request: EnergyRequest, storey: CampaignStorey) -> list[Tally]:
     """Return what was counted of each scan of a storey; one that cannot be read is left out."""
     folder = Path(request.folder)
     scans = {scan.scan: scan for scan in storey.scans}
     sources, errors = find_sources([folder / scan.path for scan in storey.scans])
     truth = _truth(folder, storey)
-    place = request.place(storey.storey)
+    place = request.place_of(storey.storey)
     progress.expect(place, PER_SCAN * len(sources))
-    with recorded(request.store, _run(request, storey.storey)) as record:
+    with recorded(request.store, request.begun(ENERGY, storey.storey)) as record:
         made = {s.name: _submit(request, place.of_scan(s.name), s, truth, scans) for s in sources}
         tallies, failed = [], [error.path for error in errors]
         for name, futures in made.items():

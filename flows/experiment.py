@@ -10,7 +10,7 @@ from prefect import flow
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, NonNegativeInt
 
 from flows import progress
-from flows.disjoint import Learnt, ScoredStorey, check_disjoint
+from flows.disjoint import Learnt, ScoredStorey, check_disjoint, learnt_by
 from flows.outcomes import Outcome, RepeatsFailed
 from flows.params import MapSenseParams
 from flows.plans import true_plan
@@ -67,13 +67,27 @@ class ExperimentRequest(BaseModel):
                 truth=storey.truth,
                 variant=variant,
                 seed=seed,
-                params=seeded(params, seed),
+                params=seeded(_of_storey(params, storey), seed),
                 run=new_id(),
             )
             for storey in self.storeys
             for variant, params in self.variants.items()
             for seed in self.seeds
         ]
+
+    def learnt_for(self, storey: ScoredStorey) -> list[Learnt]:
+        """Return what was learnt from by anything that maps a storey."""
+        named = (_of_storey(params, storey).grammar for params in self.variants.values())
+        grammars = sorted({grammar for grammar in named if grammar is not None})
+        return [*self.learnt, *(each for name in grammars for each in learnt_by(name))]
+
+
+def _of_storey(params: MapSenseParams, storey: ScoredStorey) -> MapSenseParams:
+    """Return the parameters with the storey's own grammar, where its file is named after it."""
+    if params.grammar is None:
+        return params
+    own = params.grammar.replace("{building}", storey.building).replace("{storey}", storey.storey)
+    return params.model_copy(update={"grammar": own})
 
 
 @flow(name=EXPERIMENT, flow_run_name="{request.name}", task_runner=threads())
@@ -93,7 +107,7 @@ def run_experiment(request: ExperimentRequest, jobs: int | None = None) -> Any:
     RepeatsFailed
         If a repeat failed, after all the others are done; it holds all outcomes.
     """
-    check_disjoint(request.learnt, request.storeys)
+    check_disjoint((storey, request.learnt_for(storey)) for storey in request.storeys)
     inputs = {(s.building, s.storey): _inputs(s, request.store) for s in request.storeys}
     repeats = [_with_truth(asked, inputs) for asked in request.repeats()]
     progress.gather(request.id, request.name, len(repeats))

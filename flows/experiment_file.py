@@ -17,6 +17,9 @@ truth = "plans/level2.geojson"      # or labelled points; or a building model, a
 
 [variants.coarse.voxels]            # voxels.edge_m of the variant "coarse"
 edge_m = 0.05
+
+[variants.own]                      # a grammar for each building; {storey} works likewise
+grammar = "grammars/{building}.toml"
 """
 
 import tomllib
@@ -32,6 +35,7 @@ from flows.disjoint import Learnt, ScoredStorey, learnt_from
 from flows.experiment import SEEDS, ExperimentRequest, Seeds
 from flows.params import MapSenseParams, parse_params
 from flows.seeds import seeds_in
+from grammars.library import library
 from storage.artifacts import check_name
 from storage.campaign import FILE, CampaignStorey, read_campaign
 from storage.errors import InputError, MapSenseError
@@ -200,11 +204,19 @@ def _variant(path: Path, name: str, base: Settings, own: Settings) -> MapSensePa
         problem = f"field 'variants': '{name}' stands for a variant's initial model"
         raise InputError(path, problem, "call the variant something else")
     try:
-        given = merged(base, own)
+        given = _with_grammar(merged(base, own), path.parent)
         refuse_seeds(given, "'seeds'")
         return parse_params(given)
     except MapSenseError as error:
         raise MapSenseError(f"{path}: variant '{name}': {error}") from error
+
+
+def _with_grammar(given: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return parameters whose grammar, if it is none of the library, is relative to the file."""
+    name = given.get("grammar")
+    if not isinstance(name, str) or name in library():
+        return given
+    return given | {"grammar": str((folder / name).resolve())}
 
 
 def _named(path: Path, name: str) -> Learnt:

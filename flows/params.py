@@ -15,9 +15,13 @@ from tasks.device.targets import TargetParams
 from tasks.device.voxels import VoxelParams
 from tasks.device.work import WorkParams
 from tasks.evaluation.detections import EvaluationParams
+from tasks.evaluation.disturbance import DisturbParams
 from tasks.evaluation.planes import PlaneQualityParams
 from tasks.evaluation.points import PointQualityParams
 from tasks.evaluation.walls import WallQualityParams
+from tasks.layout.decoding.decode import DecodeParams
+from tasks.layout.extraction.observations import ExtractParams
+from tasks.layout.placement.params import PlacementParams
 from tasks.params import Params
 from tasks.scans.read import ReadParams
 from tasks.surfaces.filtering import FilterParams
@@ -48,6 +52,17 @@ class MapSenseParams(Params):
     """Plane labelling (Eq. 6, 7)."""
     intersect: IntersectParams = IntersectParams()
     """Plane intersection (Eq. 8)."""
+    grammar: str | None = None
+    """Grammar that corrects the initial model (Sec. 4.2): the name of one that comes with MapSense,
+    or a file; None: the initial model is the final one."""
+    extract: ExtractParams = ExtractParams()
+    """Knowledge extraction: what stands along the reference lines (Fig. 8)."""
+    decode: DecodeParams = DecodeParams()
+    """The most probable rooms along each line (Eq. 9-11)."""
+    place: PlacementParams = PlacementParams()
+    """What of them becomes the final plan."""
+    disturb: DisturbParams = DisturbParams()
+    """For experiments: walls of the initial model that go missing, and false ones."""
     work: WorkParams = WorkParams()
     """When the server can use a scan."""
     energy: EnergyParams = EnergyParams()

@@ -5,6 +5,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
+from grammars.library import find_grammar
+from grammars.reading import read_grammar
 from storage.plan_geojson import to_geojson, write_plan
 from storage.sources import Source
 from tasks.evaluation.label_files import is_labels
@@ -19,6 +21,19 @@ def plan_source(path: Path) -> Source:
     return Source(
         name="plan", path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data)
     )
+
+
+def grammar_source(name: str) -> Source:
+    """Return a grammar as a stage's input, known by the hash of its bytes.
+
+    Raises
+    ------
+    InputError
+        If it is neither a file nor the name of a grammar that comes with MapSense, or is wrong.
+    """
+    path = find_grammar(name)
+    read_grammar(path)  # what is wrong in it is said before anything runs
+    return plan_source(path).model_copy(update={"name": "grammar"})
 
 
 class Truth(NamedTuple):

@@ -2,22 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
 from prefect import tags
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, field_validator
+from pydantic import NonNegativeInt, field_validator
 
 from flows import progress, stages
 from flows.evaluation import compare, compare_planes
 from flows.outcomes import Outcome, RoomScores, kept_in, room_scores, title
 from flows.params import MapSenseParams
 from flows.plans import Truth, plan_source
-from flows.request import StoreyRequest
-from flows.results import FINAL, INITIAL, Skipped, write_plans
+from flows.request import OfStorey, StoreyRequest
+from flows.results import FINAL, INITIAL, Skipped, state_of, write_plans
 from flows.storey import ending, map_scans
-from storage.artifacts import Place, check_name, read
+from storage.artifacts import check_name, read
 from storage.detections import DETECTIONS
 from storage.errors import InputError, MapSenseError
 from storage.files import write_whole
@@ -27,30 +26,19 @@ from storage.runs import (
     EVALUATE,
     FAILED,
     INITIAL_MODEL,
-    PARTIAL,
     Recorder,
-    Run,
     new_id,
-    parameter_set,
     recorded,
 )
 from storage.sources import Source
 from storage.stages import forget, reason
 
 
-class RepeatRequest(BaseModel):
+class RepeatRequest(OfStorey):
     """Map a storey with one variant and seed, and score it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
-
-    store: str
-    """Folder of the store."""
     experiment: str
     """Id of the experiment."""
-    building: str
-    """Name of the building."""
-    storey: str
-    """Name of the storey."""
     scans: tuple[str, ...]
     """Scan files, folders of one scan, or folders of scans."""
     truth: str
@@ -59,19 +47,11 @@ class RepeatRequest(BaseModel):
     """Name of the variant."""
     seed: NonNegativeInt
     """Seed that those of all random stages are drawn from."""
-    params: MapSenseParams
-    """Parameters of the stages, with these seeds."""
-    run: str
-    """Id of the run."""
 
-    @field_validator("building", "storey", "variant")
+    @field_validator("variant")
     @classmethod
-    def _is_a_name(cls, value: str) -> str:
+    def _variant_is_a_name(cls, value: str) -> str:
         return check_name(value)
-
-    def place(self) -> Place:
-        """Return the place of the storey."""
-        return Place(store=self.store, run=self.run, building=self.building, storey=self.storey)
 
     def folder(self) -> Path:
         """Return where the mapped plans are kept."""
@@ -117,7 +97,7 @@ def repeat(request: RepeatRequest, inputs: Inputs) -> list[Outcome]:
     What goes wrong is recorded and returned, never raised: it stops no other repeat.
     """
     name = title(request.building, request.storey, request.variant, request.seed)
-    progress.expect(request.place(), _stages(inputs), name)
+    progress.expect(request.place(), _stages(inputs, request.params), name)
     with tags(request.variant, f"seed {request.seed}"):
         outcomes = [_recorded(request, partial(_map_and_score, request, inputs))]
         if outcomes[0].rooms is not None and _is_refined(request.folder()):
@@ -137,7 +117,7 @@ def _map_and_score(request: RepeatRequest, inputs: Inputs, record: Recorder) -> 
     write_plans(mapped, request.folder())
     compare_planes(request.place(), mapped.used, inputs.truth, request.params)
     scored = _score(request, inputs.truth)
-    record.end(PARTIAL if skipped else COMPLETED, message)
+    record.end(state_of(mapped, skipped), message)
     return scored
 
 
@@ -161,16 +141,8 @@ def _score(request: RepeatRequest, truth: Truth) -> RoomScores:
 
 def _recorded(request: RepeatRequest, score: Callable[[Recorder], RoomScores]) -> Outcome:
     """Record a run while it goes on, and how it ended."""
-    run = Run(
-        id=request.run,
-        verb=EVALUATE,
-        building=request.building,
-        storey=request.storey,
-        asked=request.model_dump_json(),
-        started_at=datetime.now(UTC),
-        variant=request.variant,
-        seed=request.seed,
-        parameters=parameter_set(request.params.model_dump(mode="json")),
+    run = replace(
+        request.begun(EVALUATE, request.storey), variant=request.variant, seed=request.seed
     )
     try:
         with recorded(request.store, run) as record:
@@ -182,10 +154,10 @@ def _recorded(request: RepeatRequest, score: Callable[[Recorder], RoomScores]) -
         forget(request.place())
 
 
-def _stages(inputs: Inputs) -> int:
-    scans = len(inputs.sources)
+def _stages(inputs: Inputs, params: MapSenseParams) -> int:
+    scans, has_grammar = len(inputs.sources), params.grammar is not None
     of_truth = stages.PER_PLAN + scans * stages.PER_TRUE_SCAN + (inputs.truth.labels is not None)
-    return stages.of_mapping(scans) + of_truth
+    return stages.of_mapping(scans, has_grammar) + of_truth
 
 
 def _is_refined(folder: Path) -> bool:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from flows.correction import Corrected
 from flows.request import StoreyRequest
 from storage import coverage as stored_coverage
 from storage.artifacts import Ref
@@ -45,7 +46,10 @@ class UsedScan:
 class Mapped:
     """What a run has made of a storey."""
 
+    initial: Plan
     plan: Plan
+    """the final one: the initial one, corrected by the grammar if there is one"""
+    corrected: Corrected
     coverage: stored_coverage.Coverage
     scans: tuple[Scan, ...]
     quality: tuple[Quality, ...]
@@ -68,8 +72,7 @@ def write_results(request: StoreyRequest, mapped: Mapped) -> None:
 
 def write_plans(mapped: Mapped, folder: Path) -> None:
     """Write the initial and the final model, each whole or not at all."""
-    # the initial model is the final one until the grammar refines it
-    write_plan(mapped.plan, folder / INITIAL)
+    write_plan(mapped.initial, folder / INITIAL)
     write_plan(mapped.plan, folder / FINAL)
 
 
@@ -84,7 +87,7 @@ def summarise(
     return {
         "building": request.building,
         "storey": request.storey,
-        "state": _state(mapped, skipped),
+        "state": state_of(mapped, skipped),
         "message": message,
         "simulated": mapped is not None and mapped.plan.simulated,
         "run": request.run,
@@ -93,6 +96,7 @@ def summarise(
             if mapped
             else [],
             "points": sum(scan.points_kept for scan in mapped.scans) if mapped else 0,
+            "grammar": mapped.corrected.grammar or None if mapped else None,
             "params": request.params.model_dump(mode="json"),
         },
         "rejected": [{"scan": s.scan, "reason": s.reason} for s in mapped.rejected]
@@ -107,11 +111,11 @@ def summarise(
     }
 
 
-def _state(mapped: Mapped | None, skipped: list[Skipped]) -> str:
+def state_of(mapped: Mapped | None, skipped: list[Skipped]) -> str:
     """Return how a run ended."""
     if mapped is None:
         return FAILED
-    return PARTIAL if skipped else COMPLETED
+    return PARTIAL if skipped or mapped.corrected.problem else COMPLETED
 
 
 def write_summary(request: StoreyRequest, summary: dict[str, Any]) -> None:

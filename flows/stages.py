@@ -9,15 +9,17 @@ from tasks.device.targets import solve_targets
 from tasks.device.voxels import voxel_grid
 from tasks.device.work import tally_work
 from tasks.evaluation.detections import evaluate_plans
+from tasks.evaluation.disturbance import disturb
 from tasks.evaluation.planes import evaluate_planes
 from tasks.evaluation.points import evaluate_points
 from tasks.evaluation.rooms import room_errors as compare_rooms
 from tasks.evaluation.walls import evaluate_walls
+from tasks.layout.stages import decode_rooms, observe, place
 from tasks.scans.read import read_scan
 from tasks.stage.declare import stage
 from tasks.surfaces.filtering import extract_segments
 from tasks.surfaces.hough import detect_planes
-from tasks.surfaces.intersection import intersect_walls
+from tasks.surfaces.intersection import intersect_walls, wall_up
 from tasks.surfaces.labelling import label_surfaces
 from tasks.surfaces.occupancy import occupied_space
 
@@ -32,6 +34,12 @@ occupancy = stage(occupied_space, name="occupancy")
 faces = stage(label_surfaces, name="faces")
 rooms = stage(intersect_walls, name="rooms")
 
+disturbed = stage(disturb, name="disturbed")
+observations = stage(observe, name="observations")
+layout = stage(decode_rooms, name="layout")
+layout_rooms = stage(place, name="layout_rooms")
+layout_walls = stage(wall_up, name="layout_walls")
+
 room_errors = stage(compare_rooms, name="room_errors")
 plane_detections = stage(evaluate_planes, name="plane_detections")
 point_quality = stage(evaluate_points, name="point_quality")
@@ -45,10 +53,11 @@ energy_targets = stage(solve_targets, name="energy_targets")
 
 PER_SCAN = len((clouds, quality, voxels, streams, decoded, planes, segments, occupancy))
 PER_STOREY = len((faces, rooms))
+PER_GRAMMAR = len((observations, layout, layout_rooms, layout_walls))
 PER_PLAN = len((detections, wall_quality))
 PER_TRUE_SCAN = len((plane_detections,))
 
 
-def of_mapping(scans: int) -> int:
+def of_mapping(scans: int, has_grammar: bool) -> int:
     """Return how many stages the mapping of a storey runs."""
-    return PER_SCAN * scans + PER_STOREY
+    return PER_SCAN * scans + PER_STOREY + PER_GRAMMAR * has_grammar

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from contextlib import suppress
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,9 @@ from prefect.states import Failed
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import progress, stages
-from flows.initial_model import initial_plan
+from flows.correction import Corrected, correct
+from flows.disturbance import disturbed
+from flows.model import Made, final_plan, initial_plan
 from flows.request import StoreyRequest
 from flows.results import (
     Mapped,
@@ -26,9 +28,11 @@ from flows.settings import default_jobs
 from storage.artifacts import Ref, read
 from storage.coverage import COVERAGE
 from storage.errors import StoreError
+from storage.layout_rooms import LAYOUT_ROOMS
+from storage.layout_walls import LAYOUT_WALLS
 from storage.quality import QUALITY
 from storage.rooms import ROOMS
-from storage.runs import FAILED, Run, parameter_set, recorded
+from storage.runs import FAILED, recorded
 from storage.scans import SCANS
 from storage.sources import Source
 from storage.stages import forget, reason
@@ -48,23 +52,14 @@ def threads(jobs: int | None = None) -> Any:
 )
 def map_storey(request: StoreyRequest) -> Any:
     """Map one storey and return the summary; failed only if there is no plan at all."""
-    started_at = datetime.now(UTC)
-    run = Run(
-        id=request.run,
-        verb=request.verb,
-        building=request.building,
-        storey=request.storey,
-        asked=request.model_dump_json(),
-        started_at=started_at,
-        parameters=parameter_set(request.params.model_dump(mode="json")),
-    )
+    run = request.begun(request.verb, request.storey)
     with recorded(request.store, run) as record:
         try:
-            summary = _run(request, started_at)
+            summary = _run(request, run.started_at)
         except Exception as error:
             # no summary of an earlier run may speak for this one
             with suppress(StoreError):
-                write_summary(request, summarise(request, None, [], reason(error), started_at))
+                write_summary(request, summarise(request, None, [], reason(error), run.started_at))
             raise
         record.end(summary["state"], summary["message"])
     forget(request.place())
@@ -77,7 +72,9 @@ def _run(request: StoreyRequest, started_at: datetime) -> dict[str, Any]:
     skipped = [Skipped(error.path, reason(error)) for error in errors]
     mapped = None
     if sources:
-        progress.expect(request.place(), stages.of_mapping(len(sources)))
+        progress.expect(
+            request.place(), stages.of_mapping(len(sources), request.params.grammar is not None)
+        )
         mapped = map_scans(request, sources, skipped)
     if mapped is not None:
         write_results(request, mapped)
@@ -130,12 +127,16 @@ def map_scans(
     space = [occupancy[n].result() for n in used]
     rooms = stages.rooms.submit(place, faces, faces, space, params.intersect).result()
 
-    made: list[Ref] = [*faces, *rooms, *space]
+    faces, rooms = disturbed(place, params, faces, rooms)
+    # the grammar corrects it: observations along reference lines, an HMM's rooms (Sec. 4.2)
+    corrected = correct(place, params, faces, rooms, segmented)
+
+    made: list[Ref] = [*faces, *rooms, *space, *corrected.made]
     for n in used:
         made += [*sent[n].result(), quality[n].result(), streams[n].result()]
         made += [*planes[n].result(), segments[n].result()]
     scans = tuple(UsedScan(n, points[n].result(), segments[n].result()) for n in used)
-    return _mapped(request, scans, made, skipped, rejected)
+    return _mapped(request, scans, made, corrected, skipped, rejected)
 
 
 def _rejected(request: StoreyRequest, rated: dict[str, Ref]) -> dict[str, str]:
@@ -165,6 +166,7 @@ def _mapped(
     request: StoreyRequest,
     used: tuple[UsedScan, ...],
     made: list[Ref],
+    corrected: Corrected,
     skipped: list[Skipped],
     rejected: dict[str, str],
 ) -> Mapped:
@@ -177,17 +179,19 @@ def _mapped(
     notes = ["made from simulated scans"] if simulated else []
     if skipped or rejected:
         notes.append(f"made from {len(used)} of {len(used) + len(skipped) + len(rejected)} scans")
-    plan = initial_plan(
-        request.building,
-        request.storey,
-        read(ROOMS, refs["rooms"][0], store),
-        read(WALLS, refs["walls"][0], store),
-        [scan.name for scan in used],
-        simulated=simulated,
-        notes=notes,
-    )
+    rooms = read(ROOMS, refs["rooms"][0], store)
+    walls = read(WALLS, refs["walls"][0], store)
+    about = Made(request.building, request.storey, [s.name for s in used], simulated, notes)
+    initial = final = initial_plan(rooms, walls, about)
+    if corrected.made:
+        *_, placed, around = corrected.made
+        final = final_plan(
+            read(LAYOUT_ROOMS, placed, store), read(LAYOUT_WALLS, around, store), about
+        )
     return Mapped(
-        plan,
+        initial,
+        final,
+        corrected,
         read(COVERAGE, refs["coverage"][0], store),
         scans,
         tuple(read(QUALITY, ref, store) for ref in refs["quality"]),
@@ -199,6 +203,11 @@ def _mapped(
 
 def ending(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
     """Return what a person should know of how the run ended."""
+    ends = (_ending(asked, skipped, mapped), mapped.corrected.problem if mapped else "")
+    return "; ".join(end for end in ends if end)
+
+
+def _ending(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
     reasons = "; ".join(f"{s.scan}: {_without(s.reason, s.scan)}" for s in skipped)
     if mapped is None:
         return f"none of {asked} scans could be used: {reasons}"

@@ -47,6 +47,9 @@ def _origins(grammar: Grammar) -> list[str]:
 
 def _walls(grammar: Grammar) -> list[str]:
     found = [f"partitions: {grammar.partition_m:.3f} ± {grammar.partition_spread_m:.3f} m"]
+    for what, wall in (("corridor", grammar.corridor_wall), ("outer", grammar.outer_wall)):
+        if wall is not None:
+            found.append(f"{what} walls: {wall.thickness_m:.3f} ± {wall.spread_m:.3f} m")
     if grammar.module is not None:
         module = grammar.module
         found.append(f"facade module: {module.width_m:.3f} ± {module.spread_m:.3f} m")

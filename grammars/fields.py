@@ -89,9 +89,17 @@ class Fields:
     def point(self, name: str) -> tuple[float, float]:
         """Return x and y."""
         value = self.value(name)
-        if not (isinstance(value, list) and len(value) == 2 and all(map(is_number, value))):
+        if not _is_point(value):
             self.fail(name, f"is {shown(value)}", "expected [x, y] in metres")
         return float(value[0]), float(value[1])
+
+    def points(self, name: str, count: int) -> list[tuple[float, float]]:
+        """Return some points."""
+        value = self.value(name)
+        found = [p for p in value if _is_point(p)] if isinstance(value, list) else []
+        if not isinstance(value, list) or len(found) != len(value) or len(found) != count:
+            self.fail(name, f"is {shown(value)}", f"expected {count} points [x, y] in metres")
+        return [(float(x), float(y)) for x, y in found]
 
     def table(self, name: str, owner: str) -> "Fields":
         """Return a table within this one."""
@@ -128,6 +136,10 @@ class Fields:
         if not is_number(value):
             self.fail(name, f"is {shown(value)}", "expected a finite number, without quotes")
         return float(value)
+
+
+def _is_point(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
 
 
 def is_number(value: Any) -> bool:

@@ -43,6 +43,10 @@ class Rule:
         return sum(part.width_m for part in self.parts)
 
 
+Point = tuple[float, float]
+"""x and y, building frame, metres"""
+
+
 @dataclass(frozen=True, eq=False)
 class ReferenceLine:
     """A line that rooms stand along, to the left of one who walks from start to end.
@@ -53,8 +57,11 @@ class ReferenceLine:
 
     id: str
     storey: str
-    start: tuple[float, float]
-    end: tuple[float, float]
+    start: Point
+    end: Point
+    space: tuple[Point, Point, Point, Point] | None = None
+    """what the rules cut into rooms: the corners of the row, on the faces that enclose it, first
+    those at the line from start to end, then those at the rear, back again; None: not known"""
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,14 @@ class Module:
     """A facade module: widths between centre lines are its multiples, but for the spread."""
 
     width_m: float
+    spread_m: float
+
+
+@dataclass(frozen=True)
+class WallKind:
+    """How thick walls of one kind are."""
+
+    thickness_m: float
     spread_m: float
 
 
@@ -97,6 +112,10 @@ class Grammar:
     them with; 0: nothing is known, the first update replaces them"""
     lines: tuple[ReferenceLine, ...] = ()
     module: Module | None = None
+    corridor_wall: WallKind | None = None
+    """walls between a corridor and the rooms along it; None: not known"""
+    outer_wall: WallKind | None = None
+    """walls behind which lies nothing of the storey; None: not known"""
 
     @property
     def p_apriori(self) -> NDArray[np.float64]:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from grammars.fields import Fields, is_number, shown
-from grammars.model import Grammar, Module, Origin, Part, ReferenceLine, Rule
+from grammars.model import Grammar, Module, Origin, Part, Point, ReferenceLine, Rule, WallKind
 from grammars.positions import line_numbers
 from storage.errors import InputError
 
@@ -24,7 +25,7 @@ MODULE_SHARE = 0.5
 
 _FIELDS = (
     *("name", "building_type", "about", "simulated", "evidence", "classes", "partition"),
-    *("learnt_from", "module", "rules", "relations", "lines"),
+    *("corridor_wall", "outer_wall", "learnt_from", "module", "rules", "relations", "lines"),
 )
 _ID = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -52,8 +53,7 @@ def from_toml(text: str, source: Path | str) -> Grammar:
     simulated, evidence = top.flag("simulated"), top.number("evidence", 0)
     classes = _classes(top)
     rules = _rules(top, classes)
-    partition = top.table("partition", "partition")
-    partition.only(("thickness_m", "spread_m"))
+    partition = _wall(top.table("partition", "partition"))
     return Grammar(
         name=name,
         building_type=building_type,
@@ -63,8 +63,10 @@ def from_toml(text: str, source: Path | str) -> Grammar:
         classes=classes,
         rules=rules,
         p_relation=_relations(top, rules),
-        partition_m=partition.length("thickness_m"),
-        partition_spread_m=partition.length("spread_m"),
+        partition_m=partition.thickness_m,
+        partition_spread_m=partition.spread_m,
+        corridor_wall=_optional_wall(top, "corridor_wall"),
+        outer_wall=_optional_wall(top, "outer_wall"),
         evidence=evidence,
         lines=_lines(top),
         module=_module(top, rules),
@@ -177,10 +179,20 @@ def _know(table: Fields, rules: dict[str, int]) -> None:
             table.fail(id_, f"is {shown(value)}", "expected a probability")
 
 
+def _wall(table: Fields) -> WallKind:
+    table.only(("thickness_m", "spread_m"))
+    return WallKind(table.length("thickness_m"), table.length("spread_m"))
+
+
+def _optional_wall(top: Fields, name: str) -> WallKind | None:
+    table = top.optional_table(name, name)
+    return None if table is None else _wall(table)
+
+
 def _lines(top: Fields) -> tuple[ReferenceLine, ...]:
     lines: list[ReferenceLine] = []
     for table in top.tables("lines", "reference line", optional=True):
-        table.only(("id", "storey", "start", "end"))
+        table.only(("id", "storey", "start", "end", "space"))
         id_ = table.text("id")
         table = table.named(f"reference line '{id_}'")
         if id_ in (line.id for line in lines):
@@ -190,8 +202,24 @@ def _lines(top: Fields) -> tuple[ReferenceLine, ...]:
         if length < LINE_LEAST_M:
             remedy = f"expected a line of {LINE_LEAST_M:g} m or more, from start to end"
             table.fail("end", f"is {length:g} m from 'start'", remedy)
-        lines.append(ReferenceLine(id_, table.text("storey"), start, end))
+        space = _space(table, start, end) if "space" in table.values else None
+        lines.append(ReferenceLine(id_, table.text("storey"), start, end, space))
     return tuple(lines)
+
+
+def _space(table: Fields, start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the corners of a row: a simple outline to the left of its line, anticlockwise."""
+    corners = table.points("space", 4)
+    ring = np.array(corners)
+    ahead = np.array(end) - start
+    left = np.array([-ahead[1], ahead[0]]) / np.hypot(*ahead)
+    outline = Polygon(ring)
+    beside = bool(((ring - start) @ left > -LINE_LEAST_M).all())
+    if not (outline.is_valid and outline.exterior.is_ccw and beside):
+        remedy = "expected its corners at the line, from start to end, then those at the rear, back"
+        table.fail("space", "is no outline of rooms to the left of the line", remedy)
+    a, b, c, d = corners
+    return a, b, c, d
 
 
 def _module(top: Fields, rules: tuple[Rule, ...]) -> Module | None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from grammars.model import Grammar, Part, Rule
+from grammars.model import Grammar, Part, ReferenceLine, Rule
 from grammars.reading import from_toml
 from storage.files import write_whole
 
@@ -38,6 +38,16 @@ def to_toml(grammar: Grammar) -> str:
         f"[partition]  # walls between rooms\nthickness_m = {_number(grammar.partition_m)}\n"
         f"spread_m = {_number(grammar.partition_spread_m)}",
     ]
+    walls = (
+        ("corridor_wall", "between corridors and rooms", grammar.corridor_wall),
+        ("outer_wall", "around the storey", grammar.outer_wall),
+    )
+    blocks += [
+        f"[{name}]  # {what}\nthickness_m = {_number(wall.thickness_m)}\n"
+        f"spread_m = {_number(wall.spread_m)}"
+        for name, what, wall in walls
+        if wall is not None
+    ]
     if grammar.module is not None:
         blocks.append(
             f"[module]  # of the facade\nwidth_m = {_number(grammar.module.width_m)}\n"
@@ -45,11 +55,7 @@ def to_toml(grammar: Grammar) -> str:
         )
     blocks += [_rule(rule) for rule in grammar.rules]
     blocks += [_relations(grammar, i) for i in range(len(grammar.rules))]
-    blocks += [
-        f"[[lines]]\nid = {_text(line.id)}\nstorey = {_text(line.storey)}\n"
-        f"start = {_numbers(line.start)}\nend = {_numbers(line.end)}"
-        for line in grammar.lines
-    ]
+    blocks += [_line(line) for line in grammar.lines]
     return "\n\n".join(blocks) + "\n"
 
 
@@ -102,6 +108,14 @@ def _relations(grammar: Grammar, i: int) -> str:
     order = [int(j) for j in np.argsort(-row, kind="stable") if row[j] > 0]
     lines = (f"{grammar.rules[j].id} = {_number(row[j])}" for j in order)
     return "\n".join((f"[relations.{grammar.rules[i].id}]", *lines))
+
+
+def _line(line: ReferenceLine) -> str:
+    lines = ["[[lines]]", f"id = {_text(line.id)}", f"storey = {_text(line.storey)}"]
+    lines += [f"start = {_numbers(line.start)}", f"end = {_numbers(line.end)}"]
+    if line.space is not None:
+        lines.append(f"space = [{', '.join(_numbers(corner) for corner in line.space)}]")
+    return "\n".join(lines)
 
 
 def _number(value: float) -> str:

@@ -24,6 +24,11 @@ class Observations:
     """(l, 2), where each line starts: rooms lie to the left of one who walks to its end"""
     ends: NDArray[np.float64]
     """(l, 2)"""
+    end_sigma_m: NDArray[np.float64]
+    """(l, 2), standard deviations of the centres of the walls that each line starts and ends at;
+    NaN where it starts or ends at none"""
+    end_faces_m: NDArray[np.float64]
+    """(l, 2, 2), these walls' lower and upper faces along the line; NaN where not seen"""
     lines: NDArray[np.int64]
     """(n,), line of each cut, never falling"""
     cut_m: NDArray[np.float64]
@@ -60,12 +65,16 @@ class Observations:
 
 
 _LINE = ("start_x_m", "start_y_m", "end_x_m", "end_y_m")
+_ENDS = tuple(
+    f"{end}_{name}_m" for end in ("start", "end") for name in ("sigma", "lower_face", "upper_face")
+)
 _CUT = ("cut_m", "cut_sigma_m", "lower_face_m", "upper_face_m", "presence")
 SCHEMA = schema(
     "observations",
     [
         column("line", pa.string(), "reference line"),
         *(column(name, pa.float64(), "of the reference line, building frame") for name in _LINE),
+        *(column(n, pa.float64(), "of the wall the line has there", nullable=True) for n in _ENDS),
         column("from_m", pa.float64(), "start of the interval along the line"),
         column("to_m", pa.float64(), "end of the interval along the line"),
         column("room", pa.int64(), "initial model's room there", nullable=True),
@@ -92,9 +101,12 @@ def to_table(found: Observations) -> pa.Table:
     compared = iter(found.outliers)
     outliers = [None if end or not found.outliers else list(next(compared)) for end in last]
     of_line = np.hstack([found.starts, found.ends]).reshape(-1, 4)[lines]
+    at_ends = np.concatenate([found.end_sigma_m[..., None], found.end_faces_m], axis=-1)
+    at_ends = at_ends.reshape(-1, len(_ENDS))[lines]
     columns = [
         pa.array([str(found.line_ids[i]) for i in lines], pa.string()),
         *(pa.array(of_line[:, i]) for i in range(len(_LINE))),
+        *(pa.array(at_ends[:, i], from_pandas=True) for i in range(len(_ENDS))),
         pa.array(found.from_m),
         pa.array(found.to_m),
         pa.array(found.rooms, mask=found.rooms < 0),
@@ -113,13 +125,16 @@ def from_table(table: pa.Table) -> Observations:
     lines = np.array([line_ids.index(i) for i in ids], np.int64)
     first = np.append(True, np.diff(lines) > 0)[: len(lines)]
     not_last = np.append(~first[1:], False)[: len(lines)]
-    number = {name: table[name].to_numpy().astype(float) for name in (*_LINE, *_CUT)}
+    number = {name: table[name].to_numpy().astype(float) for name in (*_LINE, *_ENDS, *_CUT)}
+    at_ends = np.column_stack([number[n] for n in _ENDS])[first].reshape(-1, 2, 3)
     outliers = table["outliers"].to_pylist()
     compared = [tuple(o) for o in outliers if o is not None]
     return Observations(
         line_ids=np.array(line_ids, np.str_),
         starts=np.column_stack([number[n] for n in _LINE[:2]])[first],
         ends=np.column_stack([number[n] for n in _LINE[2:]])[first],
+        end_sigma_m=at_ends[..., 0],
+        end_faces_m=at_ends[..., 1:],
         lines=lines[not_last],
         cut_m=number["cut_m"][not_last],
         sigma_m=number["cut_sigma_m"][not_last],

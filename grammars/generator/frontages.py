@@ -12,6 +12,7 @@ from shapely import LineString, Point, Polygon
 from grammars.generator.corridors import find_corridors
 from grammars.generator.params import LearnParams
 from grammars.generator.reference_lines import corridor_lines
+from grammars.generator.spaces import Corners, space_of
 from grammars.model import ReferenceLine
 from storage.plan import Plan, PlanRoom, PlanWall
 
@@ -52,6 +53,8 @@ class Frontages:
     """one row a line, in its direction"""
     partitions_m: NDArray[np.float64]
     """thickness of each wall between two neighbours on a line"""
+    fronts_m: NDArray[np.float64]
+    """thickness of the wall between the corridor and each room on a line"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +98,20 @@ def survey(plan: Plan, params: LearnParams) -> Frontages:
     for edge, row in zip(edges, faces, strict=True):
         if row:
             start, end = ((float(x), float(y)) for x, y in edge)
-            lines.append(ReferenceLine(f"{plan.storey}-{len(lines) + 1}", plan.storey, start, end))
+            id_, space = f"{plan.storey}-{len(lines) + 1}", _space(edge, row)
+            lines.append(ReferenceLine(id_, plan.storey, start, end, space))
             rows.append(_frontages(edge, row, plan.walls, partition, params))
-    return Frontages(tuple(lines), tuple(rows), gaps)
+    fronts = np.array([face.y for row in faces for face in row], float)
+    return Frontages(tuple(lines), tuple(rows), gaps, fronts)
+
+
+def _space(edge: NDArray[np.float64], row: Sequence[_Face]) -> Corners | None:
+    rear = [point for face in row for point in _rear(face)]
+    if not rear:
+        return None
+    first, last = row[0], row[-1]
+    ends, slants = (first.low, last.high), (first.slants[0], last.slants[1])
+    return space_of(edge, np.array([face.y for face in row]), np.array(rear), ends, slants)
 
 
 def _faces(edge: NDArray[np.float64], rooms: Sequence[PlanRoom], reach_m: float) -> list[_Face]:
@@ -207,16 +221,22 @@ def _end_wall(
 
 def _depth(face: _Face) -> float:
     """Return how far a room reaches from the line, the median over its face."""
+    depths = [depth for _, depth in _rear(face)]
+    return float(np.median(depths)) if depths else float(face.outline.bounds[3])
+
+
+def _rear(face: _Face) -> list[tuple[float, float]]:
+    """Return points of a room's rear face, as x and y."""
     x0, x1 = face.reach
     top = face.outline.bounds[3]
-    depths = []
+    found = []
     for share in DEPTH_AT:
         x = x0 + share * (x1 - x0)
         ray = LineString(((x, face.y + TOUCH_M), (x, top + 1.0)))
         parts = shapely.get_parts(shapely.intersection(ray, face.outline))
         ends = [shapely.bounds(p)[[1, 3]] for p in parts if p.length > 0]
-        depths += [min(ends, key=lambda e: e[0])[1]] if ends else []
-    return float(np.median(depths)) if depths else float(top)
+        found += [(x, float(min(ends, key=lambda e: e[0])[1]))] if ends else []
+    return found
 
 
 def runs(row: Sequence[Frontage]) -> list[list[Frontage]]:

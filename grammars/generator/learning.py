@@ -11,14 +11,14 @@ from grammars.generator.frontages import Frontages, named, runs, survey
 from grammars.generator.params import LearnParams
 from grammars.generator.relations import best_strengths, count_pairs, relate, rounded
 from grammars.generator.room_types import METRE_DECIMALS, NAMELESS, classes_of, room_types
+from grammars.generator.spaces import Corners
 from grammars.generator.units import Reading, find_units
-from grammars.model import Grammar, Origin, Part, ReferenceLine, Rule
+from grammars.generator.wall_kinds import SPREAD_FLOOR_M, kind_of, outer_walls
+from grammars.model import Grammar, Origin, Part, Point, ReferenceLine, Rule, WallKind
 from storage.errors import MapSenseError
 from storage.plan import Plan
 from storage.plan_digest import plan_digest
 
-PARTITION_FLOOR_M = 0.01
-"""Least spread of the partitions' thickness, metres: plaster. Assumption."""
 ABOUT = "learnt from plans: the rooms along their corridors"
 """What a grammar tells of itself where nobody else does."""
 
@@ -68,7 +68,8 @@ def learn(
     both = params.reading == "both"
     reading = find_units(rows, len(types.parts), params.unit_parts_max, both)
     rules, p_relation = rules_of(reading, types.parts, params)
-    thickness, spread = partition_of(surveys, params)
+    partition = kind_of(np.concatenate([s.partitions_m for s in surveys]))
+    partition = partition or WallKind(params.partition_m, SPREAD_FLOOR_M)
     return Grammar(
         name=name,
         building_type=building_type,
@@ -78,8 +79,10 @@ def learn(
         classes=tuple(sorted({part.class_ for rule in rules for part in rule.parts})),
         rules=rules,
         p_relation=p_relation,
-        partition_m=thickness,
-        partition_spread_m=spread,
+        partition_m=partition.thickness_m,
+        partition_spread_m=partition.spread_m,
+        corridor_wall=kind_of(np.concatenate([s.fronts_m for s in surveys])),
+        outer_wall=kind_of(outer_walls(plans)),
         evidence=round(sum(map(len, reading.rows)) / (2 if both else 1), 1),
         lines=lines_of(plans, surveys),
         module=find_module(np.array([f.width_m for f in found]), params),
@@ -149,24 +152,15 @@ def describe_parts(parts: Sequence[Part]) -> str:
     return f"{', '.join(words)} of {' + '.join(f'{part.width_m:.2f}' for part in parts)} m"
 
 
-def partition_of(surveys: Sequence[Frontages], params: LearnParams) -> tuple[float, float]:
-    """Return the median thickness of the walls between neighbours, and the spread about it."""
-    walls = np.concatenate([s.partitions_m for s in surveys])
-    walls = walls[walls > 0]
-    if not len(walls):
-        return params.partition_m, PARTITION_FLOOR_M
-    median = float(np.median(walls))
-    spread = max(float(np.sqrt(np.mean((walls - median) ** 2))), PARTITION_FLOOR_M)
-    return round(median, METRE_DECIMALS), round(spread, METRE_DECIMALS)
-
-
 def lines_of(plans: Sequence[Plan], surveys: Sequence[Frontages]) -> tuple[ReferenceLine, ...]:
     """Return the reference lines of the storeys of one building, none if there are several."""
     if len({plan.building for plan in plans}) > 1:
         return ()
     by_storey = {p.storey: s.lines for p, s in zip(plans, surveys, strict=True)}
     return tuple(
-        ReferenceLine(line.id, line.storey, _rounded(line.start), _rounded(line.end))
+        ReferenceLine(
+            line.id, line.storey, _rounded(line.start), _rounded(line.end), _corners(line.space)
+        )
         for lines in by_storey.values()
         for line in lines
     )
@@ -177,5 +171,12 @@ def origin(plan: Plan) -> Origin:
     return Origin(plan.building, plan.storey, plan_digest(plan))
 
 
-def _rounded(point: tuple[float, float]) -> tuple[float, float]:
+def _corners(space: Corners | None) -> Corners | None:
+    if space is None:
+        return None
+    a, b, c, d = map(_rounded, space)
+    return a, b, c, d
+
+
+def _rounded(point: Point) -> Point:
     return (round(point[0], METRE_DECIMALS), round(point[1], METRE_DECIMALS))

@@ -28,8 +28,10 @@ class LearnParams(BaseModel):
     """Spread of widths where no two rooms of a plan are alike, metres. Assumption."""
     spread_samples: PositiveFloat = 3.0
     """How many rooms the spread common to all rules counts for in that of each. Assumption."""
-    depth_floor_m: PositiveFloat = 0.1
-    """Least spread of a depth, metres. Assumption: rules serve corridors of several buildings."""
+    depth_floor_m: PositiveFloat = 0.03
+    """Least spread of a depth, metres: as of a width."""
+    depth_apart_m: PositiveFloat = 0.1
+    """Rooms without a name whose depths differ by less are of one class, metres. Assumption."""
     p_least: float = Field(default=0.002, ge=0, lt=0.1)
     """Rules that were applied less often than this share are left out: no rule explains such
     rooms. Assumption: the guard against rules learnt from oddities of many plans."""

@@ -41,7 +41,7 @@ def classes_of(frontages: Sequence[Frontage], params: LearnParams) -> list[str]:
     names = [params.classes.get(class_, class_) for class_ in given]
     for group in range(by_width.max(initial=-1) + 1):
         rooms = np.nonzero(by_width == group)[0]
-        by_depth = group_values(depths[rooms], params.depth_floor_m)
+        by_depth = group_values(depths[rooms], params.depth_apart_m)
         for deep in range(by_depth.max() + 1):
             alike = rooms[by_depth == deep]
             size = [round(float(v[alike].mean()) * 100) for v in (widths, depths)]

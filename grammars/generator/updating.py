@@ -11,7 +11,8 @@ from grammars.generator.learning import classified, describe_parts, lines_of, or
 from grammars.generator.params import LearnParams
 from grammars.generator.relations import count_pairs, rounded
 from grammars.generator.room_types import METRE_DECIMALS, room_types
-from grammars.model import Grammar, Part, ReferenceLine, Rule
+from grammars.generator.wall_kinds import SPREAD_FLOOR_M, kind_of, outer_walls
+from grammars.model import Grammar, Part, ReferenceLine, Rule, WallKind
 from storage.errors import MapSenseError
 from storage.plan import Plan
 
@@ -100,6 +101,8 @@ def update(grammar: Grammar, plan: Plan, params: LearnParams, weight: float = 1.
         p_relation=p_relation,
         partition_m=thickness,
         partition_spread_m=spread or grammar.partition_spread_m,
+        corridor_wall=_wall(grammar.corridor_wall, grammar.evidence, found.fronts_m, weight),
+        outer_wall=_wall(grammar.outer_wall, grammar.evidence, outer_walls([plan]), weight),
         evidence=round(grammar.evidence + float(counts.sum()), 6),
         lines=_lines(grammar, plan, found),
     )
@@ -233,6 +236,16 @@ def _merged(
     # few values alone do not show a spread: the old one counts as one more of them
     variance = (squares + share * old[1] ** 2) / (total + share)
     return round(float(mean), METRE_DECIMALS), round(max(variance**0.5, floor), METRE_DECIMALS)
+
+
+def _wall(
+    old: WallKind | None, known: float, walls: NDArray[np.float64], weight: float
+) -> WallKind | None:
+    """Return a kind of walls that has learnt from some more."""
+    if old is None:
+        return kind_of(walls)
+    of_kind = old.thickness_m, old.spread_m
+    return WallKind(*_merged(of_kind, known, walls[walls > 0], weight, SPREAD_FLOOR_M))
 
 
 def _lines(grammar: Grammar, plan: Plan, found: Frontages) -> tuple[ReferenceLine, ...]:

@@ -1,6 +1,7 @@
 """Planes found in one scan against the true surfaces it shows."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +22,8 @@ from tasks.evaluation.matching import Pairs, assign
 from tasks.evaluation.surfaces import Surface, true_surfaces
 from tasks.params import Params
 
+BLOCK_M = 1.0
+"""Edge of the columns of space that points are looked up by."""
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -83,7 +86,7 @@ def match_planes(
     out; whatever else is flat and no surface of a room is falsely found. Nothing is aligned.
     """
     surfaces = _in_reach(true_surfaces(truth, params.least_m2, params.off_wall_m), xyz, params)
-    cells = _cells(xyz, params.cell_m)
+    cells = _Blocks.of(_cells(xyz, params.cell_m))
     seen = np.array([_seen(surface, cells, params) for surface in surfaces], float)
     compared = np.flatnonzero(
         (segments.kinds != KINDS.index("clutter")) & (segments.areas >= params.least_m2)
@@ -163,11 +166,49 @@ def _cells(xyz: NDArray[np.float64], cell_m: float) -> NDArray[np.float64]:
     return xyz[np.unique(numbers, return_index=True)[1]]
 
 
-def _seen(surface: Surface, xyz: NDArray[np.float64], params: PlaneQualityParams) -> float:
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """A scan's points by upright columns of space: those near a surface without asking all."""
+
+    xyz: NDArray[np.float64]
+    """(n, 3), by column: in the order of x, then of y"""
+    columns: NDArray[np.int64]
+    """(n,), the number of each point's column"""
+    first: NDArray[np.int64]
+    """(2,), the first column along x and y"""
+    across: int
+    """columns along y"""
+
+    @classmethod
+    def of(cls, xyz: NDArray[np.float64]) -> "_Blocks":
+        """Return points sorted into columns."""
+        at = np.floor(xyz[:, :2] / BLOCK_M).astype(np.int64)
+        first = at.min(axis=0, initial=0)
+        at -= first
+        across = int(at[:, 1].max(initial=0)) + 1
+        columns = at[:, 0] * across + at[:, 1]
+        order = np.argsort(columns, kind="stable")
+        return cls(xyz[order], columns[order], first, across)
+
+    def within(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points, (m, 3), of a box."""
+        (x0, y0), (x1, y1) = (
+            np.floor(p[:2] / BLOCK_M).astype(int) - self.first for p in (low, high)
+        )
+        y0, y1 = max(y0, 0), min(y1, self.across - 1)
+        rows = np.arange(max(x0, 0), x1 + 1) * self.across
+        starts = np.searchsorted(self.columns, rows + y0, "left")
+        stops = np.searchsorted(self.columns, rows + y1, "right")
+        parts = [self.xyz[i:j] for i, j in zip(starts, stops, strict=True)]
+        near = np.concatenate([np.empty((0, 3)), *parts])
+        return near[np.all((near >= low) & (near <= high), axis=1)]
+
+
+def _seen(surface: Surface, points: _Blocks, params: PlaneQualityParams) -> float:
     """Return the share of a surface's cells in which the scan has a point on it."""
     size, reach = params.cell_m, params.offset_m
     low, high = _bounds(surface)
-    near = xyz[np.all((xyz >= low - reach) & (xyz <= high + reach), axis=1)]
+    near = points.within(low - reach, high + reach)
     near = near[np.abs((near - surface.origin) @ surface.normal) <= reach]
     a0, b0, a1, b1 = surface.area.bounds
     a, b = np.meshgrid(np.arange(a0 + size / 2, a1, size), np.arange(b0 + size / 2, b1, size))
@@ -210,6 +251,7 @@ def _candidates(
 ) -> tuple[Pairs, NDArray[np.float64], NDArray[np.float64]]:
     """Return the pairs that may be one, with the IoU of their areas, their angles and offsets."""
     normals = np.array([surface.normal for surface in surfaces]).reshape(-1, 3)
+    boxes = np.array([_bounds(surface) for surface in surfaces]).reshape(-1, 2, 3)
     found: list[tuple[int, int, float, float, float]] = []
     for i, rings in outlines.items():
         # arccos loses half the digits of small angles: by the chord instead
@@ -219,7 +261,10 @@ def _candidates(
             turned = np.ones(len(normals))
         chords = np.linalg.norm(normals * turned[:, None] - normal, axis=1)
         angles = 2 * np.arcsin(np.minimum(chords / 2, 1.0))
-        for j in np.flatnonzero(angles <= params.angle_rad).tolist():
+        # in the middle of what both cover they are no further apart than that
+        low, high = rings[0].min(axis=0) - params.offset_m, rings[0].max(axis=0) + params.offset_m
+        meet = np.all((boxes[:, 0] <= high) & (boxes[:, 1] >= low), axis=1)
+        for j in np.flatnonzero(meet & (angles <= params.angle_rad)).tolist():
             shared, iou = _shared(rings, surfaces[j], params.overlap)
             if shared is None:
                 continue

@@ -57,7 +57,20 @@ def true_surfaces(plan: Plan, least_m2: float, off_wall_m: float) -> tuple[Surfa
     a ceiling has no wall faces either) is left out. Outer faces are none: nobody scans them.
     """
     openings = [o for o in (*plan.doors, *plan.windows) if None not in (o.sill_m, o.head_m)]
-    surfaces = (s for room in plan.rooms for s in _of_room(room, openings, off_wall_m))
+    lines = np.array([opening.line for opening in openings], object)
+    surfaces = (
+        surface
+        for room in plan.rooms
+        # what is further from the room than that lies in none of its walls
+        for surface in _of_room(
+            room,
+            [
+                openings[i]
+                for i in np.flatnonzero(shapely.dwithin(lines, room.polygon, off_wall_m * 1.01))
+            ],
+            off_wall_m,
+        )
+    )
     return tuple(surface for surface in surfaces if surface.area.area >= least_m2)
 
 

@@ -17,6 +17,8 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from storage.corners import Corners
 from storage.coverage import Coverage
 from storage.faces import SEEN_LOW, SEEN_OVER, SEEN_WALL, Faces
+from storage.layout_rooms import LayoutRooms
+from storage.layout_walls import LayoutWalls
 from storage.occupancy import Occupancy
 from storage.rooms import Rooms
 from storage.walls import Walls
@@ -118,6 +120,20 @@ def intersect_walls(
     rooms = _rooms(plane, coverage, params)
     walls = pair_walls(rooms, faces, params.thinnest_m, params.thickest_m)
     return rooms, walls, room_corners(rooms, faces)
+
+
+def wall_up(layout: LayoutRooms, faces: Faces, params: IntersectParams) -> LayoutWalls:
+    """Return the walls of the final plan: those of its rooms, as the faces beside them were seen.
+
+    Parameters
+    ----------
+    layout : LayoutRooms
+        Rooms of the final plan.
+    faces : Faces
+        Wall faces of the storey.
+    """
+    cutting = _cutting(faces, params)
+    return LayoutWalls(pair_walls(layout.rooms, cutting, params.thinnest_m, params.thickest_m))
 
 
 def _empty() -> tuple[Rooms, Walls, Corners]:

@@ -149,6 +149,8 @@ def lines_of(walls: int) -> Observations:
         line_ids=np.array([f"rls{i}" for i in each]),
         starts=np.zeros((20, 2)),
         ends=np.column_stack([[b[-1] for b in bounds], np.zeros(20)]),
+        end_sigma_m=np.full((20, 2), np.nan),
+        end_faces_m=np.full((20, 2, 2), np.nan),
         lines=np.repeat(each, walls),
         cut_m=np.concatenate(cuts),
         sigma_m=np.full(n, 0.05),

@@ -5,7 +5,7 @@ import pytest
 from shapely import box
 
 from flows.demo import BUILDING, STOREY, compare_rooms, small_campaign
-from flows.initial_model import initial_plan
+from flows.model import Made, initial_plan
 from storage.plan import Plan, PlanRoom
 from storage.plan_geojson import read_plan, write_plan
 from storage.rooms import Rooms
@@ -83,7 +83,7 @@ def test_a_plan_keeps_what_is_unknown_unknown(tmp_path):
         rooms=np.array([[0, 1], [0, -1]], np.int32),
         seen=np.ones(2),
     )
-    made = initial_plan("b", "0", rooms, walls, ["a", "b", "c"], notes=["a note"])
+    made = initial_plan(rooms, walls, Made("b", "0", ["a", "b", "c"], notes=["a note"]))
     write_plan(made, tmp_path / "plan.geojson")
     made = read_plan(tmp_path / "plan.geojson")
     assert [room.scans for room in made.rooms] == [("a", "c"), ()]

@@ -6,7 +6,7 @@ import numpy as np
 
 from grammars.describing import BAR, describe
 from grammars.library import find_grammar
-from grammars.model import Grammar, Part, ReferenceLine, Rule
+from grammars.model import Grammar, Part, ReferenceLine, Rule, WallKind
 from grammars.reading import read_grammar
 
 
@@ -39,6 +39,12 @@ def test_the_text_tells_rules_walls_followers_and_source():
     lines = text.splitlines()
     assert "  small  unit 0.75, small 0.25" in lines and "  unit   small 1.00" in lines
     assert lines[-1] == "  unit   small 1.00" and text.endswith("\n")
+
+
+def test_the_text_tells_of_walls_where_they_are_known():
+    known = replace(grammar(), outer_wall=WallKind(0.3, 0.02))
+    assert "outer walls: 0.300 ± 0.020 m" in describe(known)
+    assert "corridor walls" not in describe(known)
 
 
 def test_rules_stand_in_the_order_of_their_probability_with_bars_to_scale():

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grammars.model import Grammar, Module, Origin, Part, ReferenceLine, Rule
+from grammars.model import Grammar, Module, Origin, Part, ReferenceLine, Rule, WallKind
 from grammars.reading import from_toml, read_grammar
 from grammars.writing import to_toml, write_grammar
 from storage.errors import InputError
@@ -149,6 +149,27 @@ WRONG = {
     "no rules": (re.compile(r"\[\[rules\]\].*?(?=\[\[lines)", re.S), "", 1, "'rules'", "add it"),
     "degenerate line": ("[21.6, 0]", "[0.05, 0]", 47, "line 'south': 'end' is 0.05 m", "0.1 m or"),
     "three coordinates": ("[21.6, 0]", "[21.6, 0, 0]", 47, "'end' is", "[x, y]"),
+    "space to the right": (
+        "end = [21.6, 0]\n",
+        "end = [21.6, 0]\nspace = [[0, -5], [21.6, -5], [21.6, -0.2], [0, -0.2]]\n",
+        48,
+        "line 'south': 'space' is no outline of rooms to the left",
+        "corners at the line, from start to end",
+    ),
+    "space walked the wrong way": (
+        "end = [21.6, 0]\n",
+        "end = [21.6, 0]\nspace = [[0, 5], [21.6, 5], [21.6, 0.2], [0, 0.2]]\n",
+        48,
+        "'space' is no outline",
+        "then those at the rear, back",
+    ),
+    "space of three corners": (
+        "end = [21.6, 0]\n",
+        "end = [21.6, 0]\nspace = [[0, 0.2], [21.6, 0.2], [21.6, 5]]\n",
+        48,
+        "'space' is [[0, 0.2]",
+        "expected 4 points",
+    ),
     "module that divides nothing": (
         "width_m = 2.4\nspread_m",
         "width_m = 2.9\nspread_m",
@@ -180,6 +201,17 @@ def test_what_is_wrong_is_named_with_file_line_and_remedy(case):
     assert caught.value.field.startswith(f"line {line}: ")
     assert wrong in caught.value.field
     assert remedy in caught.value.remedy
+
+
+def test_walls_and_the_space_of_a_line_are_read():
+    walls = "[corridor_wall]\nthickness_m = 0.24\nspread_m = 0.01\n\n[module]"
+    space = "end = [21.6, 0]\nspace = [[0, 0.2], [21.6, 0.2], [21.6, 5], [0, 5]]\n"
+    text = TEXT.replace("[module]", walls).replace("end = [21.6, 0]\n", space)
+    grammar = from_toml(text, "g")
+    assert (grammar.corridor_wall, grammar.outer_wall) == (WallKind(0.24, 0.01), None)
+    assert grammar.lines[0].space == ((0, 0.2), (21.6, 0.2), (21.6, 5), (0, 5))
+    with pytest.raises(InputError, match=r"line 16: corridor_wall: 'thickness_m' is 0"):
+        from_toml(text.replace("0.24", "0"), "g")
 
 
 def test_a_text_that_is_no_toml_is_refused_with_its_line():
@@ -238,7 +270,7 @@ def grammars(draw) -> Grammar:
         rules.append(Rule(f"r-{i}_x", tuple(parts), float(p_apriori[i]), note, note[::-1]))
     points = st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
     lines = [
-        ReferenceLine(f"l{i}", draw(texts), (x, y), (x + draw(lengths), y))
+        ReferenceLine(f"l{i}", draw(texts), (x, y), (x + draw(lengths), y), draw(spaces(x, y)))
         for i, (x, y) in enumerate(draw(st.lists(points, max_size=3)))
     ]
     origins = draw(st.lists(st.builds(Origin, texts, texts, texts), max_size=2, unique=True))
@@ -256,7 +288,17 @@ def grammars(draw) -> Grammar:
         draw(lengths),
         draw(st.floats(0, 1e6)),
         tuple(lines),
+        None,
+        *(draw(st.none() | st.builds(WallKind, lengths, lengths)) for _ in range(2)),
     )
+
+
+@st.composite
+def spaces(draw, x: float, y: float):
+    """Return the corners of a row over a line that runs along x, or None."""
+    low, high = y + draw(st.floats(0.1, 0.5)), y + draw(st.floats(3, 9))
+    right = x + draw(st.floats(2, 90))
+    return draw(st.none() | st.just(((x, low), (right, low), (right + 1, high), (x - 1, high))))
 
 
 @settings(max_examples=100, deadline=None)

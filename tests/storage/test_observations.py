@@ -14,6 +14,10 @@ THREE_LINES = Observations(
     line_ids=np.array(["c0-1", "c0-3", "east"]),
     starts=np.array([[0.0, 0.0], [9.0, 2.0], [1.0, 5.0]]),
     ends=np.array([[9.0, 0.0], [0.0, 2.0], [1.0, 8.0]]),
+    end_sigma_m=np.array([[0.01, np.nan], [np.nan, np.nan], [0.02, 0.03]]),
+    end_faces_m=np.array(
+        [[[-0.1, np.nan], [np.nan, np.nan]], np.full((2, 2), np.nan), [[-0.1, 0.1], [np.nan, 3.1]]]
+    ),
     lines=np.array([0, 0, 2]),
     cut_m=np.array([2.4, 1 / 3 + 6, 1.5]),
     sigma_m=np.array([0.01, 0.02, 0.3]),
@@ -32,6 +36,8 @@ NONE = Observations(
     line_ids=np.empty(0, np.str_),
     starts=NO_POINT,
     ends=NO_POINT,
+    end_sigma_m=NO_POINT,
+    end_faces_m=np.empty((0, 2, 2)),
     lines=NO_INT,
     cut_m=NO,
     sigma_m=NO,

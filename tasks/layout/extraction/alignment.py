@@ -20,6 +20,12 @@ class AlignParams(Params):
     """A line lies on a wall no further beside it, metres. Assumption."""
     turned_rad: PositiveFloat = 0.06
     """A line lies on a wall turned no further, radians. Assumption."""
+    own_beside_m: PositiveFloat = 0.25
+    """Lines are the building's own if they lie no further beside its walls, metres: what scans of a
+    storey drift by at most. Assumption."""
+    own_covered: float = Field(default=0.75, gt=0, le=1)
+    """...and if so much of the length of the walls lies on lines as well; of lines that were moved,
+    as much on walls. Assumption."""
 
 
 NEAR_TURN = 0.02
@@ -87,6 +93,18 @@ def align(
             "for; set lines = 'corridors', or take a grammar of this building"
         )
     return best
+
+
+def fit_both_ways(
+    lines: NDArray[np.float64], runs: NDArray[np.float64], params: AlignParams
+) -> float:
+    """Return the share of lines' length on walls, if they are the building's own; 0 if not."""
+    if not len(lines) or not len(runs):
+        return 0.0
+    close = params.model_copy(update={"beside_m": params.own_beside_m})
+    share = float(_on_walls(lines, runs, close)[0].sum() / _lengths(lines).sum())
+    covered = float(_on_walls(runs, lines, close)[0].sum() / _lengths(runs).sum())
+    return share if share >= params.fit_min and covered >= params.own_covered else 0.0
 
 
 def _lengths(lines: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -207,21 +207,23 @@ def _wall(
     members: tuple[int, ...], sheets: Sequence[Sheet], partition: tuple[float, float]
 ) -> _Wall:
     mine = tuple(sheets[i] for i in members)
-    if len(mine) == 2:
+    # an outline's edge that nobody saw tells less of the other face than how thick walls are
+    tell = tuple(i for i, sheet in enumerate(mine) if sheet.seen) or tuple(range(len(mine)))
+    if len(tell) == 2:
         low, high = mine
         faces = low.at if low.seen else np.nan, high.at if high.seen else np.nan
         half = max((high.at - low.at) / 2, 0.0)
         sigma = np.hypot(low.sigma, high.sigma) / 2
         return _Wall((low.at + high.at) / 2, faces, half, 0, float(sigma), mine)
-    (one,) = mine
+    one = mine[tell[0]]
+    # of a pair the first is the lower face
+    facing = one.facing if len(mine) == 1 else 2 * tell[0] - 1
     half = partition[0] / 2
-    at = one.at - one.facing * half
-    spread = partition[1] / 2 if one.facing else half
+    at = one.at - facing * half
+    spread = partition[1] / 2 if facing else half
     at_face = one.at if one.seen else np.nan
-    faces = (at_face if one.facing <= 0 else np.nan, at_face if one.facing > 0 else np.nan)
-    if one.facing == 0:
-        faces = np.nan, np.nan
-    return _Wall(at, faces, half, -one.facing, float(np.hypot(one.sigma, spread)), mine)
+    faces = (at_face if facing < 0 else np.nan, at_face if facing > 0 else np.nan)
+    return _Wall(at, faces, half, -facing, float(np.hypot(one.sigma, spread)), mine)
 
 
 def _depth(wall: _Wall, usual: float) -> float:

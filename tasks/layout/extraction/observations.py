@@ -92,6 +92,8 @@ def _observations(
         line_ids=np.array(ids, np.str_),
         starts=np.array([row.frame.start for row in rows]).reshape(-1, 2),
         ends=np.array(ends).reshape(-1, 2),
+        end_sigma_m=np.array([row.end_sigma for row in rows]).reshape(-1, 2),
+        end_faces_m=np.array([row.end_faces for row in rows]).reshape(-1, 2, 2),
         lines=np.repeat(np.arange(len(rows)), [len(b.at) for b in cuts]),
         cut_m=np.concatenate([none, *(b.at for b in cuts)]),
         sigma_m=np.concatenate([none, *(b.sigma for b in cuts)]),

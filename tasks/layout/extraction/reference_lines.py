@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from grammars.model import Grammar, ReferenceLine
 from storage.errors import MapSenseError
-from tasks.layout.extraction.alignment import AlignParams, align
+from tasks.layout.extraction.alignment import AlignParams, align, fit_both_ways
 from tasks.layout.extraction.corridors import CorridorParams, find_corridors, straight_runs
 from tasks.layout.extraction.model import LineFrame, Model
 from tasks.params import Params
@@ -17,11 +17,13 @@ from tasks.params import Params
 class LineParams(Params):
     """Where reference lines come from."""
 
-    lines: Literal["corridors", "aligned", "grammar"] = "corridors"
+    lines: Literal["best", "corridors", "aligned", "grammar"] = "best"
     """`corridors`: along the walls of the storey's own; `aligned`: those of the grammar, moved and
-    turned as a whole onto these; `grammar`: the grammar's, as they are (Sec. 4.2.2)."""
+    turned as a whole onto these; `grammar`: the grammar's, as they are (Sec. 4.2.2); `best`: the
+    grammar's if they are this building's, as they are or else aligned, and else `corridors`."""
     storey: str = ""
-    """Storey whose lines are taken of the grammar; empty: its only one."""
+    """Storey whose lines are taken of the grammar; empty: its only one, or with `best` that whose
+    lines fit best."""
     corridor: CorridorParams = CorridorParams()
     """What is taken for a corridor."""
     align: AlignParams = AlignParams()
@@ -56,14 +58,51 @@ def place_lines(model: Model, grammar: Grammar, params: LineParams) -> Reference
     """
     corridors = find_corridors(model, params.corridor)
     runs = straight_runs(model.rooms.polygons[corridors], params.corridor)
-    if params.lines == "corridors":
+    if params.lines == "best":
+        best = _best(grammar, runs, corridors, params)
+        if best is not None:
+            return best
+    if params.lines in ("best", "corridors"):
         ids = tuple(f"run-{i + 1}" for i in range(len(runs)))
         return ReferenceLines(ids, runs, corridors, given=False)
     lines = _lines_of(grammar, params.storey)
-    ends = np.array([(line.start, line.end) for line in lines], float)
+    ends = _ends(lines)
     if params.lines == "aligned":
         ends = align(ends, runs, f"grammar '{grammar.name}'", params.align).apply(ends)
-    return ReferenceLines(tuple(line.id for line in lines), ends, corridors, given=True)
+    return ReferenceLines(_ids(lines), ends, corridors, given=True)
+
+
+def _best(
+    grammar: Grammar, runs: NDArray[np.float64], corridors: NDArray[np.int64], params: LineParams
+) -> ReferenceLines | None:
+    """Return the grammar's lines where they fit, as given or else aligned; None if none do."""
+    storeys = dict.fromkeys(line.storey for line in grammar.lines)
+    asked = [s for s in storeys if not params.storey or s == params.storey]
+    of_storey = [tuple(line for line in grammar.lines if line.storey == s) for s in asked]
+    for moved in (False, True):
+        best, share = None, 0.0
+        for lines in of_storey if len(runs) else ():
+            ends = _ends(lines)
+            try:
+                if moved:
+                    ends = align(ends, runs, grammar.name, params.align).apply(ends)
+            except MapSenseError:
+                continue  # these do not fit, others may
+            fits = fit_both_ways(ends, runs, params.align)
+            # lines that are moved may come to lie anywhere: more is asked of them
+            if fits > share and (not moved or fits >= params.align.own_covered):
+                best, share = ReferenceLines(_ids(lines), ends, corridors, given=True), fits
+        if best is not None:
+            return best
+    return None
+
+
+def _ids(lines: tuple[ReferenceLine, ...]) -> tuple[str, ...]:
+    return tuple(line.id for line in lines)
+
+
+def _ends(lines: tuple[ReferenceLine, ...]) -> NDArray[np.float64]:
+    return np.array([(line.start, line.end) for line in lines], float)
 
 
 def _lines_of(grammar: Grammar, storey: str) -> tuple[ReferenceLine, ...]:

@@ -40,6 +40,10 @@ class Row:
 
     frame: LineFrame
     branches: Branches
+    end_sigma: NDArray[np.float64]
+    """(2,), of the centres of the walls it starts and ends at; NaN: at none"""
+    end_faces: NDArray[np.float64]
+    """(2, 2), their lower and upper faces along the line; NaN where not seen"""
     front_m: float
     depth_m: float
 
@@ -66,13 +70,17 @@ def lay_row(
     reach = min(span[0], 0.0) - CORNER_M, max(span[1], frame.length) + CORNER_M
     sheets = find_sheets(frame, reach, front, corridors, model, params)
     branches = join_faces(sheets, frame, front, depth, model, partition, params)
-    ends = [0.0, frame.length]
+    ends: list[float] = [0.0, frame.length]
+    walls = [-1, -1]
     for k, side in enumerate((-1, 1) if len(mine) else ()):
         last = fronts.rooms[mine[np.argmax(side * fronts.spans[mine, k])]]
         oblique = _oblique(frame, int(last), span[k], side, partition[0], model, params)
-        ends[k] = _end(span[k], ends[k], side, branches, params) if oblique is None else oblique
+        if oblique is None:
+            ends[k], walls[k] = _end(span[k], ends[k], side, branches, params)
+        else:
+            ends[k] = oblique
     if ends[1] - ends[0] < params.sliver_m:  # walls of two rows that meet in a point
-        ends = [span[0], span[1]]
+        ends, walls = [span[0], span[1]], [-1, -1]
     start = frame.building(np.array([ends[0], 0.0]))
     moved = LineFrame(start, frame.along, ends[1] - ends[0])
     inside = np.flatnonzero((branches.at > ends[0]) & (branches.at < ends[1]))
@@ -86,7 +94,11 @@ def lay_row(
         kept.beside,
         kept.outliers,
     )
-    return Row(moved, shifted, front, depth)
+    known = [w >= 0 for w in walls]
+    sigma, faces = np.full(2, np.nan), np.full((2, 2), np.nan)
+    sigma[known] = branches.sigma[[w for w in walls if w >= 0]]
+    faces[known] = branches.faces[[w for w in walls if w >= 0]] - ends[0]
+    return Row(moved, shifted, sigma, faces, front, depth)
 
 
 def _span(fronts: Fronts, mine: NDArray[np.int64], length: float) -> tuple[float, float]:
@@ -134,8 +146,10 @@ def _oblique(
     return float(foot[k, 0] - foot[k, 1] * slope + side * partition / 2 * np.hypot(1, slope))
 
 
-def _end(last: float, corner: float, side: int, branches: Branches, params: BranchParams) -> float:
-    """Return where a row ends whose last room's face ends at `last`.
+def _end(
+    last: float, corner: float, side: int, branches: Branches, params: BranchParams
+) -> tuple[float, int]:
+    """Return where a row ends whose last room's face ends at `last`, and the branch, -1 for none.
 
     At the axis of the wall there; where none stands square on the line, at the corridor's corner.
     """
@@ -145,8 +159,9 @@ def _end(last: float, corner: float, side: int, branches: Branches, params: Bran
     off = np.abs(inner - last)
     near = np.flatnonzero(off <= AT_END_M)
     if len(near):
-        return float(branches.at[near[np.argmin(off[near])]])
-    return corner if abs(corner - last) <= CORNER_M else last + side * params.outer_m / 2
+        wall = int(near[np.argmin(off[near])])
+        return float(branches.at[wall]), wall
+    return (corner if abs(corner - last) <= CORNER_M else last + side * params.outer_m / 2), -1
 
 
 def _depth(frame: LineFrame, rooms: NDArray[np.int64], front: float, model: Model) -> float:

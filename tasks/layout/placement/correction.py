@@ -10,8 +10,9 @@ from shapely import Polygon
 
 from tasks.layout.placement.cutting import cut
 from tasks.layout.placement.facing import facing_edges
+from tasks.layout.placement.moved_rooms import all_redrawn, with_known_walls
 from tasks.layout.placement.moves import WallKey, agreed, without
-from tasks.layout.placement.outline import Edges, edges_of, moved
+from tasks.layout.placement.outline import Edges, edges_of
 from tasks.layout.placement.shapes import Shape, make_shapes
 from tasks.layout.placement.storey import Storey
 from tasks.layout.placement.validity import overlaps, walls_at_fault
@@ -56,7 +57,7 @@ def corrected(storey: Storey, refused: Refused) -> Plan:
     shapes = make_shapes(storey, refused.rooms)
     edges = edges_of([shape.polygon for shape in shapes])
     facing = facing_edges(edges, params.thickest_m)
-    boundaries, wishes = wishes_of(storey, shapes, edges)
+    boundaries, wishes = wishes_of(storey, shapes, edges, facing)
     _, asked = agreed(wishes, facing, edges.length_m)
     by_m, keys = agreed(without(wishes, refused.walls), facing, edges.length_m)
 
@@ -65,9 +66,11 @@ def corrected(storey: Storey, refused: Refused) -> Plan:
     pieces = []
     for i, shape in enumerate(shapes):
         own = np.flatnonzero(edges.shape == i)
-        polygon = moved(shape.polygon, by_m[own])
+        polygon = _moved(shape.polygon, own, by_m, edges, keys, storey)
         if polygon is None:
-            faults |= Refused(walls=_of(own, keys))
+            walls_of = _of(own, keys)
+            ends = frozenset(key for key in walls_of if key.kind in ("front", "back"))
+            faults |= Refused(walls=ends or walls_of)
             polygon = shape.polygon
         rooms = _cut(polygon, shape, boundaries, storey)
         if rooms is None:
@@ -80,6 +83,20 @@ def corrected(storey: Storey, refused: Refused) -> Plan:
     for edge, of_edge in asked.items():
         walls[edges.shape[edge]] |= of_edge
     return Plan(shapes, pieces, boundaries, walls, faults)
+
+
+def _moved(
+    polygon: Polygon,
+    own: NDArray[np.int64],
+    by_m: NDArray[np.float64],
+    edges: Edges,
+    keys: Mapping[int, set[WallKey]],
+    storey: Storey,
+) -> Polygon | None:
+    """Return an outline with its edges moved; along walls where that is impossible drawn anew."""
+    parts = by_m[own], edges.ends[own], [keys.get(edge, set()) for edge in own.tolist()]
+    found = with_known_walls(polygon, *parts, storey)
+    return found or all_redrawn(polygon, *parts, storey)
 
 
 def _of(edges: Iterable[int], keys: Mapping[int, set[WallKey]]) -> frozenset[WallKey]:

@@ -26,7 +26,8 @@ class DecodedRow:
     """(n,), row of each in the layout"""
     chain: Chain
     faces_m: NDArray[np.float64]
-    """(n + 1, 2), observed lower and upper face of each boundary's wall; NaN unseen"""
+    """(n + 1, 2), observed lower and upper face of each boundary's wall, be it a cut or the wall
+    that the line ends at; NaN unseen"""
     presence: NDArray[np.float64]
     """(n + 1,), 0 where nothing was seen"""
     cuts: NDArray[np.int64]
@@ -39,6 +40,11 @@ class DecodedRow:
     """(m, 2), faces of all cuts of the line"""
     line_presence: NDArray[np.float64]
     """(m,)"""
+
+    @property
+    def walled_ends(self) -> NDArray[np.bool_]:
+        """(n + 1,), where the line ends at a wall of which a face was seen."""
+        return (self.cuts == LINE_END) & ~np.isnan(self.faces_m).all(axis=1)
 
     @property
     def two_faced(self) -> NDArray[np.bool_]:
@@ -92,6 +98,10 @@ def _row(
     position = np.append(layout.from_m[decoded], layout.to_m[decoded[-1]])
     sigma = np.where(cuts == LINE_END, end_sigma_m, HIDDEN_SIGMA_M)
     faces, presence = np.full((len(cuts), 2), np.nan), np.zeros(len(cuts))
+    known = ~np.isnan(observations.end_sigma_m[line])
+    ends = np.array([0, len(cuts) - 1])[known]
+    sigma[ends] = observations.end_sigma_m[line, known]
+    faces[ends] = observations.end_faces_m[line, known]
     seen = cuts >= 0
     at = of_line[cuts[seen]]
     position[seen], sigma[seen] = observations.cut_m[at], observations.sigma_m[at]

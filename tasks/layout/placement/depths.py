@@ -11,7 +11,11 @@ from tasks.layout.placement.seen import face_sigma
 SQUARE_COS = np.cos(np.radians(8))
 """Edges turned further from a line are no front or back of its rooms."""
 SHORTEST_M = 0.5
-"""A shorter edge is a niche or a pillar, metres."""
+"""A shorter edge is a niche or a pillar, metres: it tells of no wall, but goes with its room's."""
+JOG_M = 0.3
+"""An edge no further off the one of its room that moves goes with it, metres."""
+ENOUGH, MOST = 3, 0.5
+"""A wall that so many rooms have, and so much of a row's length lies on, is the row's."""
 FRONT_M = 0.7
 """A front is no further from its line than a thick wall, metres."""
 
@@ -27,6 +31,7 @@ def depth_moves(
     seen: NDArray[np.float64],
     face_sigma_m: float,
     align_m: float,
+    hidden_m: float,
     limit: float,
 ) -> Moves:
     """Return how a row's fronts and backs move, outwards, so that they lie on straight walls.
@@ -40,7 +45,9 @@ def depth_moves(
     seen : (e,) share of each edge along which a wall was seen
     face_sigma_m : standard deviation of a face seen along all its length
     align_m : edges whose depths have no greater gap between them lie on one wall
-    limit : a face is moved by no more than this many of its standard deviations
+    hidden_m : a single room's face no further before the wall of its row is furniture that hides
+        it, unless the rule's depth tells otherwise
+    limit : a face is moved by no more than this many of its standard deviations otherwise
 
     Notes
     -----
@@ -50,20 +57,50 @@ def depth_moves(
     t, facing = row.frame.local(edges.middle)[:, 1], edges.outward @ row.frame.left
     ends = row.frame.local(edges.ends)[..., 1]
     sigma = face_sigma(seen, face_sigma_m)
-    usable = part_of[edges.shape] & (edges.length_m >= SHORTEST_M) & (t > -align_m)
+    of_row = part_of[edges.shape] & (t > -align_m)
     parts = []
     for kind, look, near in (("front", -facing, t < FRONT_M), ("back", facing, t > FRONT_M)):
-        of_kind = np.flatnonzero(usable & near & (look > SQUARE_COS))
-        for wall in _on_one_wall(of_kind, t, sigma, align_m, limit):
+        of_kind = of_row & near & (look > SQUARE_COS)
+        long = np.flatnonzero(of_kind & (edges.length_m >= SHORTEST_M))
+        jogs = np.flatnonzero(of_kind & (edges.length_m < SHORTEST_M))
+        walls = _on_one_wall(long, t, sigma, align_m, limit)
+        main = _of_the_row(walls, edges)
+        sign = 1 if kind == "back" else -1
+        for wall in walls:
             at, spread = _fused(wall, t, sigma)
             if kind == "back":
                 at, spread = _with_rules(at, spread, wall, t, edges, depth_m, depth_spread_m, limit)
-            by = (at - ends[wall]) * (1 if kind == "back" else -1)
-            moves = np.abs(by.mean(axis=1)) <= limit * sigma[wall]
-            key = WallKey(kind, number, int(first[edges.shape[wall]].min()))
-            count = int(moves.sum())
-            parts.append(Moves(wall[moves], by[moves], np.full(count, spread), (key,) * count))
+            moves = np.abs(at - t[wall]) <= limit * sigma[wall]
+            if main is not None and wall is not main:
+                place, of_main = _fused(main, t, sigma)
+                depth = depth_m[edges.shape[wall[0]]] if kind == "back" else np.nan
+                alone = len(np.unique(edges.shape[wall])) == 1
+                before = 0 < sign * (place - at) <= hidden_m
+                if alone and before and not abs(depth - place) > abs(depth - at):
+                    at, spread, moves = place, of_main, np.ones(len(wall), bool)
+            edge = _with_jogs(wall[moves], jogs, t, edges)
+            by = sign * (at - ends[edge])
+            keys = tuple(WallKey(kind, number, int(i)) for i in first[edges.shape[edge]])
+            parts.append(Moves(edge, by, np.full(len(edge), spread), keys))
     return all_moves(*parts)
+
+
+def _of_the_row(walls: list[NDArray[np.int64]], edges: Edges) -> NDArray[np.int64] | None:
+    """Return the wall that most of a row's rooms share, None where they share none."""
+    lengths = [float(edges.length_m[wall].sum()) for wall in walls]
+    if not walls or max(lengths) < MOST * sum(lengths):
+        return None
+    main = walls[int(np.argmax(lengths))]
+    return main if len(np.unique(edges.shape[main])) >= ENOUGH else None
+
+
+def _with_jogs(
+    moving: NDArray[np.int64], jogs: NDArray[np.int64], t: NDArray[np.float64], edges: Edges
+) -> NDArray[np.int64]:
+    """Return edges with the short ones of their rooms that are jogs of the same wall."""
+    same = edges.shape[jogs][:, None] == edges.shape[moving][None, :]
+    near = np.abs(t[jogs][:, None] - t[moving][None, :]) <= JOG_M
+    return np.concatenate([moving, jogs[(same & near).any(axis=1)]])
 
 
 def _on_one_wall(

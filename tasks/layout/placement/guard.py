@@ -39,6 +39,7 @@ def fuse_guarded(
     chains: Sequence[Chain],
     ties: Sequence[Tie],
     firm: Sequence[NDArray[np.bool_]],
+    doubted: Sequence[NDArray[np.bool_]],
     limit: float,
     most: float,
 ) -> tuple[list[Fused], Masks]:
@@ -48,14 +49,21 @@ def fuse_guarded(
     ----------
     firm : per line (n + 1,) bool
         Which boundaries are well observed.
+    doubted : per line (n,) bool
+        Rooms whose rules are refused in any case.
     limit : float
         Standard deviations, see above.
     most : float
         Share of the rules between firm boundaries above which contradictions rule out them all.
     """
-    refused = [contradicted(c, f, limit) for c, f in zip(chains, firm, strict=True)]
+    refused = [
+        contradicted(c, f, limit) | no for c, f, no in zip(chains, firm, doubted, strict=True)
+    ]
     tested = sum(int(_testable(c, f).sum()) for c, f in zip(chains, firm, strict=True))
-    if tested >= ENOUGH and sum(int(no.sum()) for no in refused) > most * tested:
+    wrong = sum(
+        int((_testable(c, f) & no).sum()) for c, f, no in zip(chains, firm, refused, strict=True)
+    )
+    if tested >= ENOUGH and wrong > most * tested:
         refused = [~np.isnan(chain.width_m) for chain in chains]
     while True:
         left = [chain.without(no) for chain, no in zip(chains, refused, strict=True)]

@@ -76,7 +76,7 @@ def agreed(
     fronts = set()
     for edge, wall in zip(moves.edge.tolist(), moves.wall, strict=True):
         walls.setdefault(edge, set()).add(wall)
-        if wall.kind == "front":
+        if wall.kind in ("front", "near", "corridor"):
             fronts.add(edge)
     wished = total > 0
     along = np.zeros_like(by)

@@ -22,6 +22,8 @@ SHORTEST_M = 0.5
 """A room stands on a line along no less of it, metres."""
 OBLIQUE_M = 0.05
 """A wall whose place along a line changes by more as it leaves the line is not square on it."""
+THINNEST_M, THICKEST_M = 0.04, 0.5
+"""Rooms beyond a row's end that are nearer or further have no wall in common with it, metres."""
 SPREAD_M = 0.005
 """Standard deviation of a true width: what the plan itself is rounded to."""
 
@@ -34,7 +36,7 @@ def true_layout(
     initial: Rooms,
     polygons: Sequence[Polygon],
     classes: Sequence[str],
-    partition_m: float,
+    outer_m: float,
     same_m: float,
 ) -> Layout:
     """Return the true rooms along each line as if decoded, with their true widths.
@@ -47,8 +49,8 @@ def true_layout(
     ----------
     observations, initial : what was observed, and the initial model it was observed of
     polygons, classes : the true rooms, corridors among them
-    partition_m : float
-        Thickness of the wall that a row's ends are taken to have.
+    outer_m : float
+        Thickness of the outer walls that lines were laid with.
     same_m : float
         A true wall is the nearest observed one no further off, else hidden.
 
@@ -65,7 +67,7 @@ def true_layout(
         if not found:
             continue
         inner = [(below + above) / 2 for (_, _, below), (_, above, _) in pairwise(found)]
-        low, high = _ends(frame, polygons, found, partition_m)
+        low, high = _ends(frame, polygons, found, outer_m)
         true = np.array([low, *inner, high])
         cut_m = observations.cut_m[observations.lines == line]
         cuts = _matched(cut_m, true[1:-1], same_m)
@@ -134,18 +136,27 @@ def _standing(
 
 
 def _ends(
-    frame: LineFrame, polygons: Sequence[Polygon], found: list[Stretch], partition_m: float
+    frame: LineFrame, polygons: Sequence[Polygon], found: list[Stretch], outer_m: float
 ) -> tuple[float, float]:
-    """Return where a row of true rooms ends: where the line does, if the wall there is oblique."""
-    deeper = {i: (low, high) for i, low, high in _behind(frame, polygons, 2 * BEHIND_M)}
+    """Return where a row of true rooms ends: where the line does, if the wall there is oblique.
+
+    At the axis of the wall between its last room and the next, be it of another row; else of an
+    outer wall.
+    """
+    deeper = _behind(frame, polygons, 2 * BEHIND_M)
     (first, low, _), (last, _, high) = found[0], found[-1]
+    own = {i: (below, above) for i, below, above in deeper}
     square = [
-        first in deeper and abs(deeper[first][0] - low) < OBLIQUE_M,
-        last in deeper and abs(deeper[last][1] - high) < OBLIQUE_M,
+        first in own and abs(own[first][0] - low) < OBLIQUE_M,
+        last in own and abs(own[last][1] - high) < OBLIQUE_M,
     ]
+    before = [low - above for _, _, above in deeper if above < low + OBLIQUE_M]
+    after = [below - high for _, below, _ in deeper if below > high - OBLIQUE_M]
+    walls = [min(gaps, default=THICKEST_M) for gaps in (before, after)]
+    half = [(t if THINNEST_M < t < THICKEST_M else outer_m) / 2 for t in walls]
     return (
-        low - partition_m / 2 if square[0] else 0.0,
-        high + partition_m / 2 if square[1] else frame.length,
+        low - half[0] if square[0] else 0.0,
+        high + half[1] if square[1] else frame.length,
     )
 
 

@@ -31,6 +31,17 @@ class PlacementParams(Params):
     """A room's side this near to an observed face lies on it, metres."""
     align_m: PositiveFloat = 0.12
     """Rooms whose fronts or backs differ by no more share one straight wall, metres."""
+    hidden_m: PositiveFloat = 0.6
+    """A face that furniture hides is taken for one no further before it, metres: what cupboards are
+    deep."""
+    beyond_m: PositiveFloat = 0.35
+    """A face was put no further behind the wall it is of, metres."""
+    known_sigma_m: PositiveFloat = 0.01
+    """Standard deviation of a wall's place from storey to storey of one building, metres: DIN 18202
+    allows 24 mm over 6 m in plan, taken for more than two of them."""
+    drift_m: PositiveFloat = 0.05
+    """Standard deviation of where a storey's scans put a wall in the building, metres: they drift
+    together, faces near each other alike."""
     thickest_m: PositiveFloat = 0.5
     """Rooms further apart are no neighbours, metres."""
     thinnest_m: PositiveFloat = 0.02

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from storage.layout import HIDDEN, LINE_END
+from tasks.layout.placement.choice import Choice
 from tasks.layout.placement.decoded_rows import DecodedRow
+from tasks.layout.placement.hypotheses import THICKEST_M, Hypotheses
 from tasks.layout.placement.moves import Moves, WallKey
 from tasks.layout.placement.outline import Edges
 from tasks.layout.placement.seen import face_sigma
@@ -16,6 +17,8 @@ from tasks.layout.placement.widths import Chain, Fused, Tie
 
 SQUARE_COS = np.cos(np.radians(8))
 """Edges turned further from square on the line are no side walls of its rooms."""
+THINNEST_M = 0.04
+"""No wall between rooms is thinner, metres: plaster slabs of 50 mm (DIN EN 12859), as seen."""
 TIE_SIGMA_M = 0.02
 """A wall that two lines cross is straight but for this, metres."""
 ASTRAY_M = 0.5
@@ -75,9 +78,10 @@ def find_sides(
                 continue
             for side, look in ((0, facing), (1, -facing)):
                 beside = of_row & (look > SQUARE_COS)
-                if cut == LINE_END:
-                    inner = side == int(k == 0)  # the rooms beyond are another line's
-                    on = beside & inner & (np.abs(s - row.chain.observed_m[k]) <= END_REACH_M)
+                if cut == LINE_END and side != int(k == 0):
+                    continue  # the rooms beyond are another line's
+                if cut == LINE_END and not row.walled_ends[k]:
+                    on = beside & (np.abs(s - row.chain.observed_m[k]) <= END_REACH_M)
                 else:
                     face = row.faces_m[k, side]
                     if np.isnan(face):
@@ -115,7 +119,7 @@ def with_end_walls(
     chains = []
     for number, row in enumerate(rows):
         sigma = row.chain.sigma_m.copy()
-        for k in np.flatnonzero(row.cuts == LINE_END):
+        for k in np.flatnonzero((row.cuts == LINE_END) & ~row.walled_ends):
             on = sides.edge[(sides.row == number) & (sides.boundary == k)]
             if len(on):
                 face = face_sigma(seen[on].max(), face_sigma_m)
@@ -145,27 +149,18 @@ def shared_walls(rows: Sequence[DecodedRow], sides: Sides, edges: Edges) -> list
 
 
 def thickness(
-    row: DecodedRow,
-    face_sigma_m: float,
-    partition_m: float,
-    partition_spread_m: float,
-    thickest_m: float,
+    row: DecodedRow, fused: Fused, hypotheses: Sequence[Hypotheses], choice: Choice
 ) -> NDArray[np.float64]:
-    """Return the thickness of each boundary's wall, (n + 1,); 0 at the line's ends.
+    """Return the thickness of each boundary's wall, (n + 1,); 0 where a line ends at none seen.
 
-    Where both faces were seen and it is more probable than not that they are those of one of the
-    grammar's partitions, their distance and the partition's by their precisions; where it is some
-    other wall, no thicker than `thickest_m`, their distance; where they were not seen, the
-    partition's.
+    By the chosen hypothesis: a wall of which one face is known is as thick as its centre is off
+    that face.
     """
-    seen = row.faces_m[:, 1] - row.faces_m[:, 0]
-    own, rule = 2 * face_sigma_m**2, partition_spread_m**2
-    mean = (seen / own + partition_m / rule) / (1 / own + 1 / rule)
-    partition = norm.pdf(seen, partition_m, np.sqrt(own + rule)) > 1 / thickest_m
-    with np.errstate(invalid="ignore"):
-        usable = row.two_faced & (seen > 0)
-    found = np.where(usable, np.where(partition, mean, seen), partition_m)
-    return np.where(row.cuts == LINE_END, 0.0, found)
+    found = [
+        np.clip(wall.thickness_at(h, at), THINNEST_M, THICKEST_M)
+        for wall, h, at in zip(hypotheses, choice.walls.tolist(), fused.position_m, strict=True)
+    ]
+    return np.where((row.cuts == LINE_END) & ~row.walled_ends, 0.0, found)
 
 
 def side_moves(
@@ -189,7 +184,7 @@ def side_moves(
         if not explained[r][max(k - 1, 0) : k + 1].any():
             continue
         position, outwards = fused[r].position_m[k], 1 if side == 0 else -1
-        if rows[r].cuts[k] == LINE_END:
+        if rows[r].cuts[k] == LINE_END and not rows[r].walled_ends[k]:
             share = 1 - min(axis_sigma_m / chains[r].sigma_m[k], 1.0) ** 2
             move = np.full(2, share * (position - chains[r].observed_m[k]))
         else:

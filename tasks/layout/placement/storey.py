@@ -11,6 +11,7 @@ from grammars.model import Grammar
 from storage.layout import Layout
 from storage.walls import Walls
 from tasks.layout.placement.decoded_rows import DecodedRow, main_rows
+from tasks.layout.placement.known_walls import KnownWalls, known_walls
 from tasks.layout.placement.params import PlacementParams
 from tasks.layout.placement.validity import overlap_m2
 
@@ -31,6 +32,12 @@ class Storey:
     def overlap_m2(self) -> NDArray[np.float64]:
         """By how much the initial rooms overlap, (n, n)."""
         return overlap_m2(self.initial)
+
+    @cached_property
+    def known(self) -> KnownWalls:
+        """The walls that the grammar knows the place of, if it is of this building."""
+        ids = [str(self.layout.line_ids[row.decoded[0]]) for row in self.rows]
+        return known_walls(self.grammar, self.rows, ids)
 
     @cached_property
     def main_rows(self) -> NDArray[np.int64]:

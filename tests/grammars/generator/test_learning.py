@@ -33,7 +33,7 @@ def test_a_grammar_worked_by_hand(make_row):
     assert [rule.id for rule in grammar.rules] == ["a_240", "b_480", "c_360"]
     assert grammar.classes == ("a", "b", "c")
     assert [rule.parts for rule in grammar.rules] == [
-        (Part(class_, width, 0.03, 5.0, 0.1),)
+        (Part(class_, width, 0.03, 5.0, 0.03),)
         for class_, width in (("a", 2.4), ("b", 4.8), ("c", 3.6))
     ]
     p = np.array([3, 2, 1]) / 6

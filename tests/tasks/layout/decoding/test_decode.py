@@ -45,6 +45,8 @@ def observed(lines):
         line_ids=np.array([f"rls{i}" for i in range(count)], np.str_),
         starts=np.zeros((count, 2)),
         ends=np.column_stack([lengths, np.zeros(count)]),
+        end_sigma_m=np.full((count, 2), np.nan),
+        end_faces_m=np.full((count, 2, 2), np.nan),
         lines=of_cut,
         cut_m=joined([line[1] for line in lines]),
         sigma_m=joined([line[2] for line in lines]),

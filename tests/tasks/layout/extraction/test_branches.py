@@ -142,6 +142,21 @@ def test_outlines_alone_make_cuts_less_sure_than_seen_walls():
     assert seen.beside[both].tolist() == [[0, 1]]
 
 
+@pytest.mark.parametrize("seen", [(6.9, DOWN), (6.9, 0), (7.14, UP), (7.14, 0)])
+def test_an_outline_that_nobody_saw_has_no_say_beside_a_face_that_was_seen(seen):
+    # a room that was not entered reaches to the far face of its neighbour's wall, or near it
+    unseen = 7.14 if seen[0] < 7 else 6.9
+    edges = rooms(box(0, FRONT, min(seen[0], unseen), DEPTH),
+                  box(max(seen[0], unseen), FRONT, 14, DEPTH))  # fmt: skip
+    found = branches(faces(seen), edges)
+    wall = np.abs(found.at - 7) < 0.2
+    side = 1 if seen[0] < 7 else -1
+    assert found.at[wall] == pytest.approx([seen[0] + side * PARTITION[0] / 2])
+    assert found.sigma[wall] == pytest.approx([np.hypot(0.02, PARTITION[1] / 2)])
+    expected = (seen[0], np.nan) if side == 1 else (np.nan, seen[0])
+    np.testing.assert_allclose(found.faces[wall], [expected])
+
+
 def test_a_wall_between_two_rooms_is_more_probable_than_one_within_a_room():
     wall = faces((6.9, DOWN), (7.1, UP))
     apart = branches(wall, rooms(box(0, FRONT, 6.9, DEPTH), box(7.1, FRONT, 14, DEPTH)))

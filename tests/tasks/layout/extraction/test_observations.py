@@ -124,6 +124,26 @@ def test_cuts_are_the_centres_of_the_plans_walls_to_the_millimetre(name):
 
 
 @pytest.mark.parametrize("name", STOREYS)
+def test_a_line_knows_the_faces_of_the_walls_it_ends_at(name):
+    plan = storey(name)
+    found = extracted(outlines(plan))
+    rooms = shapely.union_all(outlines(plan))
+    some = 0
+    for i, (start, along, left, length) in enumerate(frames(found)):
+        for end, at in enumerate((0.0, length)):
+            lower, upper = found.end_faces_m[i, end]
+            assert np.isnan(found.end_sigma_m[i, end]) <= np.isnan([lower, upper]).all()
+            for face, inwards in ((lower, -1), (upper, 1)):
+                if not np.isnan(face):
+                    some += 1
+                    assert (face - at) * inwards > 0.05
+                    probe = start + face * along + 1.5 * left
+                    beside = shapely.points([probe + s * inwards * 0.02 * along for s in (-1, 1)])
+                    assert rooms.intersects(beside).tolist() == [False, True]
+    assert some >= len(found) / 2  # others end at a wall that is not square on them
+
+
+@pytest.mark.parametrize("name", STOREYS)
 def test_each_room_along_a_corridor_stands_on_one_line_and_in_its_interval(name):
     plan = storey(name)
     found = extracted(outlines(plan))

@@ -257,3 +257,62 @@ def test_lines_of_another_building_failure():
         align(around, straight, "grammar 'ring'", AlignParams())
     with pytest.raises(MapSenseError, match="0% of their length lies on walls of its 0 corridor"):
         align(around, np.empty((0, 2, 2)), "grammar 'ring'", AlignParams())
+
+
+def test_the_best_lines_are_the_grammars_as_they_are_where_they_fit():
+    rooms, grammar = comb()
+    lines = np.array([(line.start, line.end) for line in grammar.lines])
+    drifted = [shapely.transform(p, lambda xy: xy + np.array([0.0, 0.1])) for p in rooms]
+    placed = place_lines(model(drifted), grammar, LineParams())
+    assert placed.given and placed.ends.tolist() == lines.tolist()
+
+
+def test_the_best_lines_are_the_grammars_aligned_where_the_storey_lies_elsewhere():
+    rooms, grammar = comb()
+    moved = Rigid(0.4, np.array([7.0, -3.0]))
+    turned = [shapely.transform(p, moved.apply) for p in rooms]
+    placed = place_lines(model(turned), grammar, LineParams())
+    lines = np.array([(line.start, line.end) for line in grammar.lines])
+    assert placed.given and placed.ends == pytest.approx(moved.apply(lines), abs=1e-4)
+
+
+@pytest.mark.parametrize("length", [8.0, 60.0])
+def test_the_best_lines_are_the_corridors_where_the_grammar_is_of_another_building(length):
+    rooms, grammar = comb()
+    # a corridor of the same width, but shorter or longer by far
+    lines = tuple(
+        replace(line, start=(line.start[0] * length / 24, y), end=(line.end[0] * length / 24, y))
+        for line in grammar.lines
+        for y in (line.start[1],)
+    )
+    placed = place_lines(model(rooms), replace(grammar, lines=lines), LineParams())
+    assert not placed.given and placed.ids == ("run-1", "run-2")
+    without = place_lines(model(rooms), replace(grammar, lines=()), LineParams())
+    assert without.ends.tolist() == placed.ends.tolist()
+
+
+def test_of_several_storeys_the_one_whose_lines_fit_gives_the_best():
+    rooms, grammar = comb()
+    upper = tuple(
+        replace(line, id=f"up-{line.id}", storey="2", start=(y, x), end=(v, u))
+        for line in grammar.lines
+        for (x, y), (u, v) in ((line.start, line.end),)
+    )
+    shifted = tuple(
+        replace(line, start=(line.start[0] / 2, 9), end=(line.end[0] / 2, 9)) for line in upper
+    )
+    several = replace(grammar, lines=(*shifted, *grammar.lines))
+    assert place_lines(model(rooms), several, LineParams()).ids == ("north", "south")
+
+
+def test_moved_lines_must_fit_better_than_given_ones():
+    rooms, grammar = comb()
+    longer = tuple(
+        replace(line, start=(line.start[0] * 1.5, y), end=(line.end[0] * 1.5, y))
+        for line in grammar.lines
+        for y in (line.start[1],)
+    )
+    long = replace(grammar, lines=longer)
+    elsewhere = [shapely.transform(p, lambda xy: xy + np.array([90.0, 40.0])) for p in rooms]
+    assert place_lines(model(rooms), long, LineParams()).given
+    assert not place_lines(model(elsewhere), long, LineParams()).given

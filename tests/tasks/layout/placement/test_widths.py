@@ -107,6 +107,7 @@ def test_replaced_widths_follow_one_another_from_the_start():
 # --- the guard
 
 FIRM = np.ones(4, bool)
+NO_DOUBT = np.zeros(12, bool)
 
 
 def test_a_rule_far_from_two_firm_walls_is_refused_and_a_near_one_is_not():
@@ -120,7 +121,7 @@ def test_a_rule_far_from_two_firm_walls_is_refused_and_a_near_one_is_not():
 def test_a_wall_not_well_observed_refuses_nothing():
     one = chain([0, 3, 6, 9], [0.03, 0.03, 0.3, 0.03], [3.0, 3.4, 2.6])
     firm = np.array([True, True, False, True])
-    fused, (refused,) = fuse_guarded([one], [], [firm], 3, 0.5)
+    fused, (refused,) = fuse_guarded([one], [], [firm], [NO_DOUBT[:3]], 3, 0.5)
     assert not refused.any()
     assert fused[0].position_m[2] > 6.1
 
@@ -132,7 +133,7 @@ def test_no_firm_wall_moves_beyond_the_limit(seed, error):
     width = rng.uniform(2, 8, 12)
     one = chain(np.concatenate([[0], np.cumsum(width)]), 0.03, width + rng.normal(0, error, 12))
     firm = rng.random(13) < 0.7
-    (fused,), (refused,) = fuse_guarded([one], [], [firm], 3, 0.5)
+    (fused,), (refused,) = fuse_guarded([one], [], [firm], [NO_DOUBT], 3, 0.5)
     assert (np.abs(fused.position_m - one.observed_m)[firm] <= 3 * 0.03 + 1e-9).all()
     if error == 0:
         assert not refused.any()
@@ -141,10 +142,10 @@ def test_no_firm_wall_moves_beyond_the_limit(seed, error):
 def test_a_grammar_that_most_firm_walls_contradict_has_no_say_at_all():
     observed = np.arange(6) * 3.0
     one = chain(observed, 0.03, [3.5, 2.4, 3.6, 3.02, 3.0])
-    (fused,), (refused,) = fuse_guarded([one], [], [np.ones(6, bool)], 3, 0.5)
+    (fused,), (refused,) = fuse_guarded([one], [], [np.ones(6, bool)], [NO_DOUBT[:5]], 3, 0.5)
     assert refused.all()
     assert fused.position_m == pytest.approx(observed)
-    _, (some,) = fuse_guarded([one], [], [np.ones(6, bool)], 3, 0.7)
+    _, (some,) = fuse_guarded([one], [], [np.ones(6, bool)], [NO_DOUBT[:5]], 3, 0.7)
     assert some.tolist() == [True, True, True, False, False]
 
 

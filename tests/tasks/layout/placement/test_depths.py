@@ -1,0 +1,64 @@
+"""Fronts and backs of a row: what furniture hides, and what is a wall of its own."""
+
+import numpy as np
+import pytest
+from shapely import box
+
+from storage.layout import LINE_END
+from tasks.layout.extraction.model import LineFrame
+from tasks.layout.placement.decoded_rows import DecodedRow
+from tasks.layout.placement.depths import depth_moves
+from tasks.layout.placement.outline import edges_of
+from tasks.layout.placement.widths import Chain
+
+
+def row():
+    none = np.zeros(0)
+    chain = Chain(np.zeros(2), np.ones(2), np.full(1, np.nan), np.full(1, np.nan))
+    return DecodedRow(
+        frame=LineFrame.between(np.zeros(2), np.array([20.0, 0.0])),
+        decoded=np.array([0]),
+        chain=chain,
+        faces_m=np.full((2, 2), np.nan),
+        presence=np.zeros(2),
+        cuts=np.array([LINE_END, LINE_END]),
+        interval_m=np.zeros((0, 2)),
+        standing=none.astype(int),
+        line_faces_m=np.zeros((0, 2)),
+        line_presence=none,
+        **({"line_scans": none} if "line_scans" in DecodedRow.__dataclass_fields__ else {}),
+    )
+
+
+def backs(depths, rule=np.nan):
+    """Return how far the back of each room moves, NaN where none is asked to."""
+    rooms = [box(4 * i, 0.2, 4 * i + 3.9, depth) for i, depth in enumerate(depths)]
+    edges, n = edges_of(rooms), len(rooms)
+    deep, spread = np.full(n, rule), np.full(n, 0.03 if rule > 0 else np.nan)
+    seen = np.ones(len(edges))
+    moves = depth_moves(
+        0, row(), edges, np.arange(n), deep, spread, np.ones(n, bool), seen, 0.03, 0.12, 0.6, 3.0
+    )
+    found = np.full(n, np.nan)
+    for edge, by, wall in zip(moves.edge, moves.by_m, moves.wall, strict=True):
+        if wall.kind == "back":
+            found[edges.shape[edge]] = by.mean()
+            assert wall.number == edges.shape[edge]  # a fault of one room leaves the others alone
+    return found
+
+
+def test_a_single_room_s_back_before_its_row_s_wall_is_furniture():
+    assert backs([5.0, 5.0, 4.7, 5.0]) == pytest.approx([0, 0, 0.3, 0], abs=1e-9)
+
+
+def test_a_back_behind_its_row_s_wall_or_far_before_it_stays():
+    assert backs([5.0, 5.0, 5.3, 5.0]) == pytest.approx([0, 0, 0, 0], abs=1e-9)
+    assert backs([5.0, 5.0, 4.2, 5.0]) == pytest.approx([0, 0, 0, 0], abs=1e-9)
+
+
+def test_two_rooms_before_their_row_s_wall_have_a_wall_of_their_own():
+    assert backs([5.0, 5.0, 5.0, 4.7, 4.7]) == pytest.approx(np.zeros(5), abs=1e-9)
+
+
+def test_a_rule_that_knows_the_smaller_depth_keeps_it():
+    assert backs([5.0, 5.0, 4.7, 5.0], rule=4.7)[2] == pytest.approx(0, abs=1e-9)
