@@ -1,5 +1,7 @@
 """Fronts and backs of a row's rooms: each is one straight wall across several rooms."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,9 @@ JOG_M = 0.3
 """An edge no further off the one of its room that moves goes with it, metres."""
 ENOUGH, MOST = 3, 0.5
 """A wall that so many rooms have, and so much of a row's length lies on, is the row's."""
+SLOPE_RAD = 0.0015
+"""Standard deviation of a wall's turn against the line of its row, radians: a line derived from a
+drifting scan of the corridor is turned by a tenth of a degree. Assumption."""
 FRONT_M = 0.7
 """A front is no further from its line than a thick wall, metres."""
 
@@ -51,11 +56,13 @@ def depth_moves(
 
     Notes
     -----
-    The depths of edges on one wall, each with a variance that grows as less of it was seen, and
-    the mean depth by the rules of the rooms that end there, once, are fused by their precisions.
+    A wall is the straight line of least squares through the edges on it, each with a variance that
+    grows as less of it was seen, nearly parallel to the row's. The mean depth by the rules of the
+    rooms that end there, once, is fused with it by their precisions.
     """
-    t, facing = row.frame.local(edges.middle)[:, 1], edges.outward @ row.frame.left
-    ends = row.frame.local(edges.ends)[..., 1]
+    s, t = row.frame.local(edges.middle).T
+    facing = edges.outward @ row.frame.left
+    along, ends = np.moveaxis(row.frame.local(edges.ends), -1, 0)
     sigma = face_sigma(seen, face_sigma_m)
     of_row = part_of[edges.shape] & (t > -align_m)
     parts = []
@@ -67,21 +74,22 @@ def depth_moves(
         main = _of_the_row(walls, edges)
         sign = 1 if kind == "back" else -1
         for wall in walls:
-            at, spread = _fused(wall, t, sigma)
+            straight = _straight(wall, s, t, sigma)
             if kind == "back":
-                at, spread = _with_rules(at, spread, wall, t, edges, depth_m, depth_spread_m, limit)
-            moves = np.abs(at - t[wall]) <= limit * sigma[wall]
+                straight = _with_rules(straight, wall, edges, depth_m, depth_spread_m, limit)
+            moves = np.abs(straight.at(s[wall]) - t[wall]) <= limit * sigma[wall]
             if main is not None and wall is not main:
-                place, of_main = _fused(main, t, sigma)
+                of_main = _straight(main, s, t, sigma)
+                at, place = (float(line.at(s[wall]).mean()) for line in (straight, of_main))
                 depth = depth_m[edges.shape[wall[0]]] if kind == "back" else np.nan
                 alone = len(np.unique(edges.shape[wall])) == 1
                 before = 0 < sign * (place - at) <= hidden_m
                 if alone and before and not abs(depth - place) > abs(depth - at):
-                    at, spread, moves = place, of_main, np.ones(len(wall), bool)
+                    straight, moves = of_main, np.ones(len(wall), bool)
             edge = _with_jogs(wall[moves], jogs, t, edges)
-            by = sign * (at - ends[edge])
+            by = sign * (straight.at(along[edge]) - ends[edge])
             keys = tuple(WallKey(kind, number, int(i)) for i in first[edges.shape[edge]])
-            parts.append(Moves(edge, by, np.full(len(edge), spread), keys))
+            parts.append(Moves(edge, by, np.full(len(edge), straight.spread_m), keys))
     return all_moves(*parts)
 
 
@@ -117,7 +125,7 @@ def _on_one_wall(
     ordered = edges[sharp][np.argsort(t[edges[sharp]], kind="stable")]
     gaps = np.flatnonzero(np.diff(t[ordered]) > align_m) + 1
     walls = [wall for wall in np.split(ordered, gaps) if len(wall)]
-    places = [float(_fused(wall, t, sigma)[0]) for wall in walls]
+    places = [float(np.average(t[wall], weights=1 / sigma[wall] ** 2)) for wall in walls]
     for edge in edges[~sharp]:
         away = [abs(place - t[edge]) for place in places]
         if away and min(away) <= limit * sigma[edge]:
@@ -128,31 +136,54 @@ def _on_one_wall(
     return walls
 
 
-def _fused(
-    wall: NDArray[np.int64], t: NDArray[np.float64], sigma: NDArray[np.float64]
-) -> tuple[float, float]:
+class _Straight(NamedTuple):
+    """A straight wall beside a row."""
+
+    place_m: float
+    """depth at its middle"""
+    middle_m: float
+    """along the row"""
+    slope: float
+    spread_m: float
+    """standard deviation of its place"""
+
+    def at(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return its depth at places along the row."""
+        return self.place_m + self.slope * (s - self.middle_m)
+
+
+def _straight(
+    wall: NDArray[np.int64],
+    s: NDArray[np.float64],
+    t: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+) -> _Straight:
+    """Return the straight wall that edges of depths t at s lie on, turned by SLOPE_RAD or so."""
     weight = 1 / sigma[wall] ** 2
-    return float(weight @ t[wall] / weight.sum()), float(1 / np.sqrt(weight.sum()))
+    place, middle = (float(weight @ x[wall] / weight.sum()) for x in (t, s))
+    off = s[wall] - middle
+    slope = float(weight @ (off * (t[wall] - place)) / (weight @ off**2 + SLOPE_RAD**-2))
+    return _Straight(place, middle, slope, float(1 / np.sqrt(weight.sum())))
 
 
 def _with_rules(
-    at: float,
-    sigma: float,
+    straight: _Straight,
     wall: NDArray[np.int64],
-    t: NDArray[np.float64],
     edges: Edges,
     depth_m: NDArray[np.float64],
     depth_spread_m: NDArray[np.float64],
     limit: float,
-) -> tuple[float, float]:
-    """Return a back wall's depth and deviation with what the rules say of it, if they agree."""
+) -> _Straight:
+    """Return a back wall with what the rules say of its depth, if they agree with it."""
+    at, sigma = straight.place_m, straight.spread_m
     rooms = np.unique(edges.shape[wall])
     rooms = rooms[~np.isnan(depth_m[rooms])]
     agree = np.abs(depth_m[rooms] - at) <= limit * np.hypot(sigma, depth_spread_m[rooms])
     if not agree.any():
-        return at, sigma
+        return straight
     # rooms of one row share their depth: what rules say of it counts once
     rule = float(depth_m[rooms][agree].mean())
     spread = float(depth_spread_m[rooms][agree].mean())
     weights = np.array([1 / sigma**2, 1 / spread**2])
-    return float(weights @ (at, rule) / weights.sum()), float(1 / np.sqrt(weights.sum()))
+    place, spread = float(weights @ (at, rule) / weights.sum()), float(1 / np.sqrt(weights.sum()))
+    return straight._replace(place_m=place, spread_m=spread)

@@ -7,7 +7,7 @@ from shapely import box
 from storage.layout import LINE_END
 from tasks.layout.extraction.model import LineFrame
 from tasks.layout.placement.decoded_rows import DecodedRow
-from tasks.layout.placement.depths import depth_moves
+from tasks.layout.placement.depths import SLOPE_RAD, _straight, depth_moves
 from tasks.layout.placement.outline import edges_of
 from tasks.layout.placement.widths import Chain
 
@@ -26,7 +26,6 @@ def row():
         standing=none.astype(int),
         line_faces_m=np.zeros((0, 2)),
         line_presence=none,
-        **({"line_scans": none} if "line_scans" in DecodedRow.__dataclass_fields__ else {}),
     )
 
 
@@ -62,3 +61,22 @@ def test_two_rooms_before_their_row_s_wall_have_a_wall_of_their_own():
 
 def test_a_rule_that_knows_the_smaller_depth_keeps_it():
     assert backs([5.0, 5.0, 4.7, 5.0], rule=4.7)[2] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_straight_wall_is_the_least_squares_line_with_a_prior_on_its_turn():
+    rng = np.random.default_rng(4)
+    s, sigma = np.sort(rng.uniform(0, 30, 7)), rng.uniform(0.005, 0.03, 7)
+    t = 5 + 0.001 * s + rng.normal(0, sigma)
+    wall = np.arange(1, 7)
+    straight = _straight(wall, s, t, sigma)
+    # unknown depth at s = 0 and slope; a last equation says what slopes are like
+    rows = np.column_stack([np.ones(6), s[wall]]) / sigma[wall, None]
+    rows = np.vstack([rows, [0, 1 / SLOPE_RAD]])
+    (depth, slope), *_ = np.linalg.lstsq(rows, np.append(t[wall] / sigma[wall], 0), rcond=None)
+    assert straight.slope == pytest.approx(slope)
+    assert straight.at(s) == pytest.approx(depth + slope * s)
+
+
+def test_a_wall_of_one_room_runs_along_the_line():
+    straight = _straight(np.array([0]), np.array([3.0]), np.array([5.0]), np.array([0.01]))
+    assert straight == (5.0, 3.0, 0.0, 0.01)
