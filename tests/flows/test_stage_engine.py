@@ -174,4 +174,5 @@ def test_two_processes_at_once_compute_each_key_once(prefect_server, store, scan
     assert sorted(done[0]["computed"] + done[1]["computed"]) == ALL
     assert sorted(done[0]["cached"] + done[1]["cached"]) == ALL
     assert run_query(store, "select count(*) as n from stages").to_pylist() == [{"n": 10}]
-    assert run_query(store, "select count(*) as n from points_all").to_pylist() == [{"n": 90}]
+    made = "select count(*) as n, count(distinct run) as runs from points_all"
+    assert run_query(store, made).to_pylist() == [{"n": 2 * 90, "runs": 2}]

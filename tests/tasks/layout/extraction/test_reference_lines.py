@@ -299,7 +299,8 @@ def test_of_several_storeys_the_one_whose_lines_fit_gives_the_best():
         for (x, y), (u, v) in ((line.start, line.end),)
     )
     shifted = tuple(
-        replace(line, start=(line.start[0] / 2, 9), end=(line.end[0] / 2, 9)) for line in upper
+        replace(line, start=(line.start[0] + 9, line.start[1] / 2), end=(line.end[0] + 9, 40))
+        for line in upper
     )
     several = replace(grammar, lines=(*shifted, *grammar.lines))
     assert place_lines(model(rooms), several, LineParams()).ids == ("north", "south")

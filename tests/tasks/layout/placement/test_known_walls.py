@@ -51,7 +51,6 @@ def row_on(start, end):
         standing=none.astype(int),
         line_faces_m=np.zeros((0, 2)),
         line_presence=none,
-        **({"line_scans": none} if "line_scans" in DecodedRow.__dataclass_fields__ else {}),
     )
 
 
