@@ -279,6 +279,28 @@ def learn(
 
 
 @grammar_app.command
+def update(
+    grammar: Annotated[str, Parameter(help="A file, or the name of one that comes along.")],
+    *plans: Annotated[Path, Parameter(help="Accepted plans: GeoJSON or IFC files.")],
+    out: Annotated[Path, Parameter(name=["--out", "-o"], help="File of the updated one.")],
+    weight: Annotated[float, Parameter(help="What a room of these counts for.")] = 1.0,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Update a grammar by plans that were mapped with it and accepted.
+
+    For example
+
+    ```
+    mapsense grammar update library.toml library-2/plan.geojson --out library.toml
+    ```
+    """
+    from flows.grammar import update_grammar
+
+    return update_grammar(grammar, plans, out, weight)
+
+
+@grammar_app.command
 def show(
     grammar: Annotated[str, Parameter(help="A file, or the name of one that comes along.")],
     /,

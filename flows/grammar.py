@@ -10,6 +10,7 @@ from flows.params import explain
 from grammars.describing import describe
 from grammars.generator.learning import learn
 from grammars.generator.params import LearnParams
+from grammars.generator.updating import update
 from grammars.library import find_grammar
 from grammars.reading import read_grammar
 from grammars.writing import write_grammar
@@ -47,6 +48,20 @@ def learn_grammar(
     write_grammar(grammar, out)
     rooms = sum(len(plan.rooms) for plan in known)
     print(f"{out}: {len(grammar.rules)} rules from {rooms} rooms of {len(known)} storeys")
+    return 0
+
+
+def update_grammar(name: str, plans: Sequence[Path], out: Path, weight: float) -> int:
+    """Update a grammar by plans that were accepted (Fig. 8, line 26), into a file."""
+    if not plans:
+        raise MapSenseError("no plan named: mapsense grammar update GRAMMAR PLAN... --out FILE")
+    if not weight > 0:
+        raise MapSenseError(f"--weight {weight}: expected more than 0")
+    grammar = read_grammar(find_grammar(name))
+    for plan in (plan for path in plans for plan in _plans(path, None)):
+        grammar = update(grammar, plan, LearnParams(), weight)
+    write_grammar(grammar, out)
+    print(f"{out}: {len(grammar.rules)} rules, learnt from {len(grammar.learnt_from)} storeys")
     return 0
 
 

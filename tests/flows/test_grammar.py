@@ -211,3 +211,15 @@ def test_a_wrong_grammar_is_told_with_line_and_field_failure(folder):
     code, _, err = mapsense("grammar", "check", "wrong.toml")
     assert code == 1
     assert "wrong.toml" in err and "p_apriory" in err and "line" in err
+
+
+def test_a_grammar_is_updated_by_a_plan_once(folder):
+    write_plan(storey("3", 7), folder / "third.geojson")
+    code, _, err = mapsense("grammar", "update", "hut.toml", "third.geojson", "-o", "more.toml")
+    assert code == 0, err
+    one, more = read_grammar(folder / "hut.toml"), read_grammar(folder / "more.toml")
+    assert [origin.storey for origin in more.learnt_from] == ["2", "3"]
+    assert more.evidence > one.evidence
+    code, _, err = mapsense("grammar", "update", "more.toml", "third.geojson", "-o", "again.toml")
+    assert code == 1
+    assert not (folder / "again.toml").exists()
