@@ -1,7 +1,6 @@
 """The grammar corrects the initial model: Fig. 2's second half of the layout (Sec. 4.2)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +9,9 @@ from prefect.futures import PrefectFuture
 from flows import stages
 from flows.params import MapSenseParams
 from flows.plans import grammar_source
+from flows.results import Corrected
 from storage.artifacts import Place, Ref
 from storage.stages import reason
-
-
-@dataclass(frozen=True)
-class Corrected:
-    """What a grammar made of an initial model."""
-
-    grammar: str = ""
-    """file of the grammar; '' if none was named"""
-    made: tuple[Ref, ...] = ()
-    """observations, layout, and the final plan's rooms and walls; none if it could not be used"""
-    problem: str = ""
-    """why it could not be used"""
 
 
 def correct(

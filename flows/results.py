@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from flows.correction import Corrected
 from flows.request import StoreyRequest
 from storage import coverage as stored_coverage
 from storage.artifacts import Ref
@@ -40,6 +39,18 @@ class UsedScan:
     name: str
     points: Ref
     segments: Ref
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """What a grammar made of an initial model."""
+
+    grammar: str = ""
+    """file of the grammar; '' if none was named"""
+    made: tuple[Ref, ...] = ()
+    """observations, layout, and the final plan's rooms and walls; none if it could not be used"""
+    problem: str = ""
+    """why it could not be used"""
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from prefect.states import Failed
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import progress, stages
-from flows.correction import Corrected, correct
+from flows.correction import correct
 from flows.disturbance import disturbed
 from flows.model import Made, final_plan, initial_plan
 from flows.request import StoreyRequest
 from flows.results import (
+    Corrected,
     Mapped,
     Skipped,
     UsedScan,

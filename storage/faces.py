@@ -1,6 +1,7 @@
 """Wall faces of a storey: the side of a wall that a room sees, merged over all scans."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
@@ -37,6 +38,21 @@ class Faces:
 
     def __len__(self) -> int:
         return len(self.offsets)
+
+    def take(self, rows: Sequence[int] | NDArray[np.int64]) -> "Faces":
+        """Return some of the faces, in the order asked for."""
+        index = np.asarray(rows, np.int64)
+        return replace(
+            self,
+            normals=self.normals[index],
+            offsets=self.offsets[index],
+            sides=self.sides[index],
+            lines=self.lines[index],
+            heights=self.heights[index],
+            weights=self.weights[index],
+            scans=self.scans[index],
+            profiles=tuple(self.profiles[i] for i in index),
+        )
 
 
 _FLOATS = (

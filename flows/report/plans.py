@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
+from flows.outcomes import kept_in
 from flows.report.data import Answers, Row, grouped, is_initial, variant_name, variant_order
 from flows.results import FINAL, INITIAL
 from storage.errors import InputError
@@ -15,8 +16,6 @@ from tasks.exports.figures.canvas import Picture
 from tasks.exports.figures.plans import Panel, draw_plans
 from tasks.exports.report import Section
 
-EVALUATIONS = "evaluations"
-"""Folder of the store that keeps the plans an evaluation made."""
 MOST_STOREYS = 12
 """Storeys drawn: a page of more is not read any more."""
 SAME = "The final plan is the initial one: no grammar was applied."
@@ -105,8 +104,7 @@ def _storey(store: Path, name: str, rows: list[Row]) -> _Drawn:
 def _paths(store: Path, row: Row) -> tuple[Path, Path]:
     """Return the plan and the truth a run compared; those in the store move with it."""
     asked = json.loads(row["asked"])
-    seed = "" if row["seed"] is None else str(row["seed"])
-    kept = store / EVALUATIONS / row["building"] / row["storey"] / row["variant"] / seed / FINAL
+    kept = store / kept_in(row["building"], row["storey"], row["variant"], row["seed"]) / FINAL
     plan, truth = (Path(asked.get(key) or "") for key in ("plan", "truth"))
     before = Path(asked.get("store") or store)
     if truth.is_relative_to(before):

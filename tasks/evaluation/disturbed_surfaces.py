@@ -32,7 +32,7 @@ def without_faces(faces: Faces, strips: Sequence[Strip]) -> Faces:
             whole.append(i)
     # of what is left of some, nothing may have been seen
     parts = [part for part in parts if part.profiles[0].any()]
-    return _joined([_take_faces(faces, whole), *parts])
+    return _joined([faces.take(whole), *parts])
 
 
 def _on_strips(faces: Faces, i: int, strips: Sequence[Strip]) -> NDArray[np.bool_]:
@@ -63,25 +63,10 @@ def _part(faces: Faces, i: int, first: int, end: int) -> Faces:
     share = float((profile[first:end] > 0).sum()) / max(int((profile > 0).sum()), 1)
     line = faces.lines[i, 0] + at[[first, end]][:, None] * along
     return replace(
-        _take_faces(faces, [i]),
+        faces.take([i]),
         lines=line[None],
         weights=faces.weights[[i]] * share,
         profiles=(profile[first:end],),
-    )
-
-
-def _take_faces(faces: Faces, rows: Sequence[int]) -> Faces:
-    index = np.array(rows, np.int64)
-    return Faces(
-        normals=faces.normals[index],
-        offsets=faces.offsets[index],
-        sides=faces.sides[index],
-        lines=faces.lines[index],
-        heights=faces.heights[index],
-        weights=faces.weights[index],
-        scans=faces.scans[index],
-        profiles=tuple(faces.profiles[i] for i in rows),
-        bin_m=faces.bin_m,
     )
 
 

@@ -7,7 +7,7 @@ polygon, a missing wall is bridged by its neighbours' extensions, and what many 
 room makes one room.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -152,17 +152,7 @@ def _cutting(faces: Faces, params: IntersectParams) -> Faces:
     wall = np.array([(p == SEEN_WALL).sum() * faces.bin_m for p in faces.profiles])
     aligned = (off < np.radians(5)) | (length > params.long_face_m)
     keep = np.flatnonzero((length >= params.min_face_m) & (wall >= params.min_face_m / 2) & aligned)
-    return replace(
-        faces,
-        normals=faces.normals[keep],
-        offsets=faces.offsets[keep],
-        sides=faces.sides[keep],
-        lines=faces.lines[keep],
-        heights=faces.heights[keep],
-        weights=faces.weights[keep],
-        scans=faces.scans[keep],
-        profiles=tuple(faces.profiles[i] for i in keep),
-    )
+    return faces.take(keep)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ before comes from the cache: an interrupted run goes on where it stopped.
 
 import argparse
 import json
-import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from commands import ask, mapsense
 from real_truth import UNCLEAR, true_plan
 
 from storage.plan_geojson import write_plan
@@ -138,7 +138,7 @@ def main() -> int:
         experiment = work / "experiment.toml"
         experiment.write_text(_toml(options.seeds, entries))
         jobs = [] if options.jobs is None else ["--jobs", str(options.jobs)]
-        _mapsense("evaluate", str(experiment), "--store", str(work / "store"), *jobs)
+        mapsense("evaluate", str(experiment), "--store", str(work / "store"), *jobs)
         text = _tables(work / "store", entries, options.seeds)
     print(text)
     if options.readme is not None:
@@ -176,7 +176,7 @@ def _simulated(options: argparse.Namespace, work: Path) -> list[dict[str, Any]]:
     if not (folder / "campaign.json").exists():
         if options.campaign is not None:
             raise SystemExit(f"{folder}: there is no campaign.json; leave --campaign out")
-        _mapsense("simulate", "--preset", PRESET, "--out", str(folder))
+        mapsense("simulate", "--preset", PRESET, "--out", str(folder))
     return [
         {
             "building": SIMULATED,
@@ -220,11 +220,11 @@ def _toml(seeds: int, entries: Sequence[Mapping[str, Any]]) -> str:
 def _tables(store: Path, entries: Sequence[Mapping[str, Any]], seeds: int) -> str:
     found: dict[tuple[str, str, str], dict[str, Any]] = {}
     for sql in (ROOMS, AREAS, SCANS, WALLS):
-        for row in _ask(store, sql):
+        for row in ask(store, sql):
             found.setdefault(_key(row), {}).update(row)
-    for row in _ask(store, NEAR):
+    for row in ask(store, NEAR):
         found.setdefault(_key(row), {})[row["class"]] = (row["precision"], row["recall"])
-    costs = {(row["building"], row["storey"]): row for row in _ask(store, COSTS)}
+    costs = {(row["building"], row["storey"]): row for row in ask(store, COSTS)}
     blocks = []
     for building in (SIMULATED, REAL):
         names = [entry["storey"] for entry in entries if entry["building"] == building]
@@ -296,24 +296,6 @@ def _key(row: Mapping[str, Any]) -> tuple[str, str, str]:
 def _markdown(rows: Sequence[Sequence[str]]) -> str:
     lines = [HEAD, ["---"] * len(HEAD), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _ask(store: Path, sql: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads(
-        _mapsense("query", sql, "--store", str(store), "--format", "json")
-    )
-    return rows
-
-
-def _mapsense(*arguments: str) -> str:
-    """Run the command a user would; what it says of its progress is shown."""
-    program = str(Path(sys.executable).with_name("mapsense"))
-    quiet = subprocess.PIPE if arguments[0] == "query" else None
-    done = subprocess.run([program, *arguments], stdout=subprocess.PIPE, stderr=quiet, check=False)
-    if done.returncode:
-        said = f": {done.stderr.decode()}" if done.stderr else ""
-        raise SystemExit(f"mapsense {arguments[0]}: exit code {done.returncode}{said}")
-    return done.stdout.decode()
 
 
 def _split(readme: Path) -> tuple[str, str]:

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,7 +24,7 @@ from flows.report.areas import area_section
 from flows.report.curves import curve_section
 from flows.report.energy import energy_sections
 from flows.report.page import ask, write_report
-from flows.report.plans import EVALUATIONS, plan_section
+from flows.report.plans import plan_section
 from flows.report.scores import score_section
 from storage import stages
 from storage.artifacts import Place, write
@@ -107,7 +108,7 @@ class Store:
 
     def evaluate(self, storey, variant, seed, found, initial, truth, true):
         """Keep a plan as an experiment does, and score it."""
-        folder = self.root / EVALUATIONS / "hut" / storey / variant / str(seed)
+        folder = self.root / "evaluations" / "hut" / storey / variant / str(seed)
         write_plan(found, folder / "plan.geojson")
         write_plan(initial, folder / "initial.geojson")
         made = (
@@ -281,8 +282,8 @@ def test_a_moved_store_still_finds_its_plans(store, tmp_path):
 def test_a_plan_that_is_gone_or_broken_is_named(store, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(store, copy)
-    (copy / EVALUATIONS / "hut" / "0" / "default" / "0" / "plan.geojson").unlink()
-    (copy / EVALUATIONS / "hut" / "1" / "default" / "0" / "plan.geojson").write_text("{")
+    (copy / "evaluations" / "hut" / "0" / "default" / "0" / "plan.geojson").unlink()
+    (copy / "evaluations" / "hut" / "1" / "default" / "0" / "plan.geojson").write_text("{")
     shutil.rmtree(copy / "truths")
     told = "\n".join(plan_section(ask(copy, None), copy).missing)
     assert "hut / 0, final: not drawn" in told
@@ -499,3 +500,9 @@ def test_a_browser_shows_the_page_whole_and_quietly(browser, page, width, scheme
     widths = browser.ask(wide)
     assert len(widths) >= 10 and min(widths) > 250 and max(widths) < width
     assert browser.ask(CONTRAST) >= 4.5
+
+
+def test_a_report_does_not_wait_for_prefect():
+    code = "import sys, flows.report.page; print('prefect' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

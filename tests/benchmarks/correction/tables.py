@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 from report import Column, Table
-from scipy.stats import t as student
 
 from correction.chain import Score
 from correction.variants import NONE, Variant
-
-CONFIDENCE = 0.95
+from tasks.exports.figures.intervals import mean_of
 
 SCORES = (
     Column("mean_m2", "mean m2", "{:.3f}"), Column("mean_pm", "+-", "{:.3f}"),
@@ -104,7 +102,5 @@ def _f1(scores: Sequence[Score]) -> float:
 
 def _within(values: Sequence[float]) -> float | None:
     """Return half the width of the confidence interval of a mean, None of a single value."""
-    if len(values) < 2:
-        return None
-    quantile = float(student.ppf((1 + CONFIDENCE) / 2, len(values) - 1))
-    return quantile * float(np.std(values, ddof=1)) / float(np.sqrt(len(values)))
+    mean = mean_of(np.array(values, float))
+    return None if np.isnan(mean.high) else mean.high - mean.value
