@@ -47,6 +47,17 @@ class Layout:
     """(n,), standard deviation of that width; NaN unexplained"""
     posteriors: NDArray[np.float64]
     """(n,), probability, given all of the line's observations, of a room of this class here"""
+    from_posteriors: NDArray[np.float64]
+    """(n,), the same that a wall stands where the room begins, whatever rooms are beside it; 1 for
+    the line's end. A decoder that takes every observed wall for one says what is observed of it"""
+    to_posteriors: NDArray[np.float64]
+    """(n,), the same of where it ends"""
+    undivided: NDArray[np.float64]
+    """(n,), the same that an observed wall within the room divides nothing, of the wall of which
+    that is least probable; 1 without any"""
+    gains: NDArray[np.float64]
+    """(n,), logarithm of how much more probable the line's observations are by the grammar than if
+    all observed walls divided rooms of any kind; the same for all rooms of a line"""
     log_p: NDArray[np.float64]
     """(n,), log probability of the hypothesis and the observations together, up to a constant of
     the line; -inf where no sequence of rules has a probability"""
@@ -74,6 +85,10 @@ _COLUMNS = {
     "widths_m": column("width_m", pa.float64(), "by the rule; null: unexplained", nullable=True),
     "spreads_m": column("spread_m", pa.float64(), "deviation of that width", nullable=True),
     "posteriors": column("posterior", pa.float64(), "probability of a room of this class here"),
+    "from_posteriors": column("from_posterior", pa.float64(), "probability of a wall there"),
+    "to_posteriors": column("to_posterior", pa.float64(), "probability of a wall there"),
+    "undivided": column("undivided", pa.float64(), "probability that no wall seen within divides"),
+    "gains": column("gain", pa.float64(), "log odds of the grammar against none, of the line"),
     "log_p": column("log_p", pa.float64(), "of the hypothesis and the observations"),
 }
 SCHEMA = schema("layout", list(_COLUMNS.values()))

@@ -25,6 +25,10 @@ def layout(n):
         widths_m=np.where(each % 3, each / 7, np.nan),
         spreads_m=np.where(each % 3, 0.1, np.nan),
         posteriors=1 / (each + 1),
+        from_posteriors=1 / (each + 2),
+        to_posteriors=1 / (each + 3),
+        undivided=1 / (each + 4),
+        gains=each / 5,
         log_p=np.where(each % 5, -each / 9, -np.inf),
     )
 

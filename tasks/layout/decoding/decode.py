@@ -6,15 +6,26 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt
 
 from grammars.model import Grammar
 from storage.layout import HIDDEN, LINE_END, Layout
 from storage.observations import Observations
 from tasks.layout.decoding.kbest import best_decodings, rooms_of
 from tasks.layout.decoding.plain import PlainParams, best_rules, make_plain, rule_rooms
-from tasks.layout.decoding.posterior import posterior, room_posteriors
-from tasks.layout.decoding.segmental import SegmentalParams, make_segmental, make_walls
+from tasks.layout.decoding.posterior import (
+    posterior,
+    room_posteriors,
+    undivided,
+    wall_posteriors,
+)
+from tasks.layout.decoding.segmental import (
+    SegmentalParams,
+    as_seen,
+    log_any,
+    make_segmental,
+    make_walls,
+)
 from tasks.layout.decoding.states import States, Unexplained, Units, make_states
 from tasks.layout.decoding.transitions import Transitions, transition_matrix
 from tasks.params import Params
@@ -43,6 +54,9 @@ class DecodeParams(Params):
     """Probability that another follows. Assumption."""
     hypotheses: PositiveInt = 3
     """Sequences of each line that the segmental decoder returns at most, the best first."""
+    near_m: PositiveFloat = 0.5
+    """Walls no further apart are one, as to how probable it is that one stands there, metres.
+    Assumption: how far off one may be that two rooms are still told by."""
     plain: PlainParams = PlainParams()
     """The paper's model."""
     segmental: SegmentalParams = SegmentalParams()
@@ -81,6 +95,11 @@ class _Sequence:
     """(m + 1,)"""
     posteriors: Floats
     """(m,)"""
+    walls: Floats
+    """(m + 1,), posterior of each wall"""
+    undivided: Floats
+    """(m,)"""
+    gain: float
     log_p: float
 
 
@@ -140,12 +159,17 @@ def _segmental(lines: list[_Line], states: States, params: DecodeParams) -> Iter
             model, line.length, line.cuts, line.sigmas, line.presence, line.depths, line.rooms
         )
         sums = posterior(model, walls)
+        gain = sums.log_total - as_seen(model, walls)
         decodings = best_decodings(model, walls, params.hypotheses)
         for i, decoding in enumerate(decodings):
             rooms = rooms_of(model, walls, decoding)
             p = room_posteriors(model, walls, decoding, sums)
+            stand = wall_posteriors(model, walls, rooms, sums, params.near_m)
+            whole = undivided(walls, rooms, sums)
             found = np.where(rooms.states < states.explained, rooms.states, -1)
-            yield _Sequence(line.id, i, found, rooms.bounds_m, rooms.cuts, p, decoding.log_p)
+            yield _Sequence(
+                line.id, i, found, rooms.bounds_m, rooms.cuts, p, stand, whole, gain, decoding.log_p
+            )
         if not decodings:
             yield _as_observed(line)
 
@@ -160,26 +184,39 @@ def _plain(lines: list[_Line], states: States, params: DecodeParams) -> Iterator
         if log_p == -np.inf:
             yield _as_observed(line)
             continue
-        found = rule_rooms(plain, states, observed, path)
-        bounds, cuts = [line.bounds[:1]], [np.array([LINE_END])]
-        for i, (rooms, shares, _) in enumerate(found):
+        found = rule_rooms(plain, states, observed, path, params.near_m)
+        bounds, cuts, walls = [line.bounds[:1]], [np.array([LINE_END])], [np.ones(1)]
+        for i, (rooms, shares, _, hidden) in enumerate(found):
             bounds += [
                 line.bounds[i] + observed[i] * np.cumsum(shares)[:-1],
                 line.bounds[i + 1, None],
             ]
             end = LINE_END if i == len(found) - 1 else i
             cuts += [np.full(len(rooms) - 1, HIDDEN), np.array([end])]
+            walls += [hidden, line.presence[i : i + 1] if end >= 0 else np.ones(1)]
         rooms, posteriors = (np.concatenate([f[k] for f in found]) for k in (0, 2))
         yield _Sequence(
-            line.id, 0, rooms, np.concatenate(bounds), np.concatenate(cuts), posteriors, log_p
+            line.id,
+            0,
+            rooms,
+            np.concatenate(bounds),
+            np.concatenate(cuts),
+            posteriors,
+            np.concatenate(walls),
+            np.ones(len(rooms)),
+            float(log_p - log_any(params.segmental, observed).sum()),
+            log_p,
         )
 
 
 def _as_observed(line: _Line) -> _Sequence:
     count = len(line.cuts) + 1
     cuts = np.concatenate([[LINE_END], np.arange(count - 1), [LINE_END]])
-    none = np.full(count, -1)
-    return _Sequence(line.id, 0, none, line.bounds, cuts, np.zeros(count), -np.inf)
+    none, nothing = np.full(count, -1), np.zeros(count)
+    walls = np.concatenate([[1.0], line.presence, [1.0]])
+    return _Sequence(
+        line.id, 0, none, line.bounds, cuts, nothing, walls, np.ones(count), 0.0, -np.inf
+    )
 
 
 def _layout(sequences: list[_Sequence], states: States) -> Layout:
@@ -206,6 +243,10 @@ def _layout(sequences: list[_Sequence], states: States) -> Layout:
         widths_m=widths[at],
         spreads_m=spreads[at],
         posteriors=_joined([s.posteriors for s in sequences], np.float64),
+        from_posteriors=_joined([s.walls[:-1] for s in sequences], np.float64),
+        to_posteriors=_joined([s.walls[1:] for s in sequences], np.float64),
+        undivided=_joined([s.undivided for s in sequences], np.float64),
+        gains=np.repeat(np.array([s.gain for s in sequences], np.float64), counts),
         log_p=np.repeat(np.array([s.log_p for s in sequences], np.float64), counts),
     )
 

@@ -4,6 +4,8 @@ All three stand in one module: what numba has compiled, it compiles again when t
 not when another does that code was taken from.
 """
 
+import math
+
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
@@ -214,6 +216,51 @@ def sum_of_run(
             if classes[runs.states[r, k]] == classes[runs.states[run, k]]:
                 summed[k] += p
     return summed
+
+
+@nb.njit(cache=True, nogil=True)
+def sum_of_hidden(
+    walls: Walls, runs: Runs, broad: Broad, widths: Floats, variances: Floats, begin: Floats,
+    rest: Floats, log_total: float, at: float, near_m: float,
+) -> float:  # fmt: skip
+    """Return how many hidden walls are to be expected within `near_m` of a place.
+
+    Given the two seen walls about its run, where a hidden one stands is a normal distribution.
+    """
+    near, scores = np.empty(runs.counts.size, np.int64), np.empty(runs.counts.size)
+    expected = 0.0
+    for a in range(walls.at.size - 1):
+        if walls.at[a] >= at + near_m:
+            break
+        between = -log_total
+        for b in range(a + 1, _last_wall(runs, walls, a) + 1):
+            if b > a + 1:
+                between += walls.passed[b - 1]
+            if walls.at[b] <= at - near_m:
+                continue
+            more = between + walls.divides[b]
+            for x in range(_score(runs, walls, broad, a, b, near, scores)):
+                r = near[x]
+                if runs.counts[r] == 1:
+                    continue
+                log_p = begin[a, runs.first[r]] + more + scores[x] + rest[b, runs.last[r]]
+                if log_p < -NOTHING:
+                    continue
+                p = np.exp(log_p)
+                total = runs.variances[r] + walls.variances[a] + walls.variances[b]
+                over = walls.at[b] - walls.at[a] - runs.widths[r]
+                mean, behind = walls.at[a], walls.variances[a]
+                for k in range(runs.counts[r] - 1):
+                    mean += widths[runs.states[r, k]]
+                    behind += variances[runs.states[r, k]]
+                    off = at - mean - over * behind / total
+                    spread = np.sqrt(2 * behind * (total - behind) / total)
+                    expected += (
+                        p
+                        * 0.5
+                        * (math.erf((off + near_m) / spread) - math.erf((off - near_m) / spread))
+                    )
+    return expected
 
 
 @nb.njit(cache=True, nogil=True)

@@ -88,9 +88,12 @@ def best_rules(plain: Plain, widths: list[Floats], lengths: Floats) -> tuple[lis
 
 
 def rule_rooms(
-    plain: Plain, states: States, widths: Floats, path: Ints
-) -> list[tuple[Ints, Floats, Floats]]:
+    plain: Plain, states: States, widths: Floats, path: Ints, near_m: float
+) -> list[tuple[Ints, Floats, Floats, Floats]]:
     """Return states, shares of the width and posteriors of each rule's rooms along a line.
+
+    Last come the posteriors of the hidden walls between them: how probable a rule is that has one
+    no further off than `near_m`.
 
     A unit's rooms share its observed width as they share the rule's. A room's posterior is the
     probability, over all sequences of any length, of a rule of as many rooms with one of its
@@ -98,11 +101,23 @@ def rule_rooms(
     """
     p_rules = rule_posteriors(plain.model, widths)
     classes = np.array(states.classes)
+    inner = [
+        np.cumsum(states.widths[a : a + n])[:-1] / states.widths[a : a + n].sum()
+        for a, n in zip(plain.first, plain.counts, strict=True)
+    ]
     found = []
-    for rule, p in zip(path, p_rules, strict=True):
+    for rule, p, width in zip(path, p_rules, widths, strict=True):
         rooms = plain.first[rule] + np.arange(plain.counts[rule])
         alike = np.flatnonzero(plain.counts == len(rooms))
         same = classes[plain.first[alike][:, None] + np.arange(len(rooms))] == classes[rooms]
         shares = states.widths[rooms] / states.widths[rooms].sum()
-        found.append((rooms, shares, p[alike] @ same))
+        hidden = [
+            sum(
+                p[i]
+                for i, walls in enumerate(inner)
+                if (np.abs(walls * width - at * width) <= near_m).any()
+            )
+            for at in inner[rule]
+        ]
+        found.append((rooms, shares, p[alike] @ same, np.minimum(np.array(hidden, float), 1.0)))
     return found

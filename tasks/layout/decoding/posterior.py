@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.layout.decoding.kbest import Decoding
-from tasks.layout.decoding.lattice import sum_all, sum_of_run
+from storage.layout import HIDDEN
+from tasks.layout.decoding.kbest import Decoding, Rooms
+from tasks.layout.decoding.lattice import sum_all, sum_of_hidden, sum_of_run
 from tasks.layout.decoding.segmental import Segmental, Walls
 
 Floats = NDArray[np.float64]
@@ -56,3 +57,39 @@ def room_posteriors(model: Segmental, walls: Walls, decoding: Decoding, sums: Po
         for a, b, r in zip(ends[:-1], ends[1:], decoding.runs, strict=True)
     ]
     return np.minimum(np.concatenate(found), 1.0)  # a sum of shares may round to more
+
+
+def wall_posteriors(
+    model: Segmental, walls: Walls, rooms: Rooms, sums: Posterior, near_m: float
+) -> Floats:
+    """Return how probable it is that each wall of a decoding stands there, (m + 1,).
+
+    Of a seen wall that is the probability that it divides rooms, of whatever class. Of a hidden one
+    it is the number of walls, seen or hidden, expected within `near_m`, at most one: all readings
+    that have a wall there count, whatever rooms they put beside it.
+    """
+    states = model.states
+    variances = states.spreads**2
+    found = np.ones(len(rooms.cuts))
+    for k, (cut, at) in enumerate(zip(rooms.cuts.tolist(), rooms.bounds_m.tolist(), strict=True)):
+        if cut >= 0:
+            found[k] = sums.walls[cut + 1]
+        elif cut == HIDDEN:
+            beside = np.abs(walls.at[1:-1] - at) <= near_m
+            found[k] = sums.walls[1:-1][beside].sum() + sum_of_hidden(
+                walls, model.runs, model.broad, states.widths, variances, sums.begin, sums.rest,
+                sums.log_total, at, near_m,
+            )  # fmt: skip
+    return np.minimum(found, 1.0)
+
+
+def undivided(walls: Walls, rooms: Rooms, sums: Posterior) -> Floats:
+    """Return how surely no wall seen within each room of a decoding divides it, (m,).
+
+    That is the probability of the most doubtful of them; one where none was seen.
+    """
+    found = np.ones(len(rooms.states))
+    inside = np.searchsorted(rooms.bounds_m, walls.at[1:-1], "right") - 1
+    passed = np.setdiff1d(np.arange(len(inside)), rooms.cuts)
+    np.minimum.at(found, inside[passed], 1 - sums.walls[1:-1][passed])
+    return np.clip(found, 0.0, 1.0)

@@ -162,6 +162,24 @@ def make_walls(
     )
 
 
+def as_seen(model: Segmental, walls: Walls) -> float:
+    """Return the log probability of a line all of whose seen walls divide rooms of any kind.
+
+    That is what is said of unexplained rooms, but for how often they come.
+    """
+    return (
+        float(walls.divides.sum() + log_any(model.params, np.diff(walls.at)).sum())
+        - np.log(model.params.deepest_m) * walls.has_depth.sum()
+    )
+
+
+def log_any(params: SegmentalParams, widths: Floats) -> Floats:
+    """Return the log density of each width of a room of any kind."""
+    away = np.log(widths / params.unexplained_width_m) / params.unexplained_spread
+    scale = np.log(params.unexplained_spread * widths) + np.log(2 * np.pi) / 2
+    return np.asarray(-0.5 * away**2 - scale)
+
+
 def _log_depths(model: Segmental, depths: Floats) -> Floats:
     states, runs, params = model.states, model.runs, model.params
     variance = states.depth_spreads**2 + params.depth_sigma_m**2

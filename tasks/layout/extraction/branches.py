@@ -45,6 +45,9 @@ OUTER_M = 1.0
 """How far from a corridor's end an outer wall is expected at most, metres. Assumption."""
 DEPTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.75, 0.9])
 """Where in the depth of the rooms it is asked who lies beside a wall."""
+FAINT_M = 0.05
+"""A face that hardly shows has to fit a partition's thickness better than another by this much,
+metres, to be the wall's. Assumption."""
 GRAIN = 0.1
 """Step in which the depth covered by wall is added up, metres."""
 
@@ -133,6 +136,20 @@ def join_faces(
     )
 
 
+def all_branches(a: Branches, b: Branches) -> Branches:
+    """Return the walls of two sources, along the line."""
+    both = Branches(
+        np.concatenate([a.at, b.at]),
+        np.concatenate([a.faces, b.faces]),
+        np.concatenate([a.sigma, b.sigma]),
+        np.concatenate([a.scans, b.scans]),
+        np.concatenate([a.presence, b.presence]),
+        np.concatenate([a.beside, b.beside]),
+        (*a.outliers, *b.outliers),
+    )
+    return both.take(np.argsort(both.at, kind="stable"))
+
+
 def without_slivers(branches: Branches, params: BranchParams) -> Branches:
     """Return the branches no two of which are nearer than a sliver, the more probable ones."""
     strong = np.lexsort((branches.at, -branches.scans, -np.round(branches.presence, 12)))
@@ -180,7 +197,8 @@ def _pair(
     """Return which sheets are two faces of one wall, and which stand alone.
 
     The pair whose distance is most like a partition's comes first. A face of unknown side may be
-    either; one that lies within a wall, or on one of its faces, is that wall's.
+    either; one that lies within a wall, or on one of its faces, is that wall's. One that
+    hardly shows comes after those that do, unless it fits clearly better.
     """
     at = np.array([s.at for s in sheets])
     facing = np.array([s.facing for s in sheets], int)
@@ -191,7 +209,9 @@ def _pair(
     fits &= (facing[:, None] != 0) | (facing[None] != 0)
     i, j = np.nonzero(fits)
     unknown = (facing[i] == 0) | (facing[j] == 0)
-    order = np.lexsort((j, i, np.abs(gaps[i, j] - partition), unknown))
+    faint = np.array([s.faint for s in sheets], float)
+    off = np.abs(gaps[i, j] - partition) + FAINT_M * (faint[i] + faint[j])
+    order = np.lexsort((j, i, off, unknown))
     free = np.ones(len(sheets), bool)
     pairs = []
     for k in order:

@@ -1,5 +1,7 @@
 """Knowledge extraction (Sec. 4.2.2, Fig. 8 lines 2-9): an initial model told along its lines."""
 
+from typing import Literal
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -9,9 +11,15 @@ from storage.faces import Faces
 from storage.observations import Observations
 from storage.rooms import Rooms
 from storage.segments import Segments
-from tasks.layout.extraction.branches import Branches, BranchParams, without_slivers
+from tasks.layout.extraction.branches import (
+    Branches,
+    BranchParams,
+    all_branches,
+    without_slivers,
+)
 from tasks.layout.extraction.fronts import fronts_on, share_out
-from tasks.layout.extraction.model import Model, lay_out
+from tasks.layout.extraction.joints import GapParams, find_joints
+from tasks.layout.extraction.model import LineFrame, Model, lay_out
 from tasks.layout.extraction.reference_lines import LineParams, place_lines
 from tasks.layout.extraction.rows import DEPTH_MAX_M, Row, lay_row
 from tasks.params import Params
@@ -24,6 +32,10 @@ class ExtractParams(Params):
     """Where reference lines come from."""
     branch: BranchParams = BranchParams()
     """What counts as a wall across them."""
+    joints: Literal["found", "ignored"] = "found"
+    """Whether walls that nobody saw are looked for where they join others."""
+    gap: GapParams = GapParams()
+    """What tells of walls that nobody saw."""
 
 
 STRIP_M = 1.5
@@ -65,22 +77,35 @@ def extract_observations(
     frames = lines.frames()
     fronts = [fronts_on(f, lines.corridors, model) for f in frames]
     partition = grammar.partition_m, grammar.partition_spread_m
-    ids, rows = [], []
+    ids, rows, standing = [], [], []
     for i, mine in enumerate(share_out(fronts)):
         if len(mine) or (lines.given and not len(fronts[i].rooms)):
             ids.append(lines.ids[i])
+            standing.append(fronts[i].rooms[mine])
             rows.append(
                 lay_row(
                     frames[i], fronts[i], mine, lines.corridors, model, partition, params.branch
                 )
             )
-    return _observations(ids, rows, model, params.branch)
+    return _observations(ids, rows, standing, model, params)
 
 
 def _observations(
-    ids: list[str], rows: list[Row], model: Model, params: BranchParams
+    ids: list[str],
+    rows: list[Row],
+    standing: list[NDArray[np.int64]],
+    model: Model,
+    params: ExtractParams,
 ) -> Observations:
-    cuts = [without_slivers(_off_ends(row, params), params) for row in rows]
+    branch = params.branch
+    cuts = []
+    for row, rooms in zip(rows, standing, strict=True):
+        found = row.branches
+        if params.joints == "found":
+            own = np.unique(rooms).tolist()
+            joints = find_joints(row.frame, own, branch.sliver_m, model, params.gap)
+            found = all_branches(found, joints)
+        cuts.append(without_slivers(_off_ends(row.frame, found, branch), branch))
     bounds = [
         np.concatenate([[0.0], b.at, [row.frame.length]]) for row, b in zip(rows, cuts, strict=True)
     ]
@@ -109,11 +134,10 @@ def _observations(
     )
 
 
-def _off_ends(row: Row, params: BranchParams) -> Branches:
+def _off_ends(frame: LineFrame, branches: Branches, params: BranchParams) -> Branches:
     """Return the branches that are no slivers with the walls at the line's ends."""
-    at = row.branches.at
-    inside = (at >= params.sliver_m) & (at <= row.frame.length - params.sliver_m)
-    return row.branches.take(np.flatnonzero(inside))
+    inside = (branches.at >= params.sliver_m) & (branches.at <= frame.length - params.sliver_m)
+    return branches.take(np.flatnonzero(inside))
 
 
 def _rooms_between(

@@ -1,5 +1,7 @@
 """How probable it is that an observed wall divides rooms: a stated model of the evidence."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,3 +57,29 @@ def presence(
         + params.scans * np.log2(np.maximum(scans, 1))
     )
     return np.asarray(1 / (1 + np.exp(-odds)))
+
+
+class JointParams(Params):
+    """Weights of the same model for a wall that nobody saw, by the gaps it leaves. Assumptions.
+
+    On storeys simulated for tuning 44 of 58 fronts and rears had a gap where a wall that was seen
+    joins them, and none at 2,798 places where none does; much less is believed of either.
+    """
+
+    base: float = -4.0
+    """Log-odds where nothing speaks for a wall."""
+    gap: float = 4.5
+    """Gain of each, front and rear, that has a gap there."""
+    solid: float = -1.5
+    """Loss where one runs through."""
+
+
+def joint_presence(says: Sequence[int], params: JointParams) -> float:
+    """Return the probability that a wall nobody saw divides a room.
+
+    Parameters
+    ----------
+    says : of front and rear 1 for a gap, -1 where it runs through, 0 where that is not known
+    """
+    odds = params.base + sum(params.gap if s > 0 else params.solid for s in says if s)
+    return float(1 / (1 + np.exp(-odds)))

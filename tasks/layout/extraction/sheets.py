@@ -64,6 +64,8 @@ class Sheet:
     """those that tell where it is; empty where scans are not known one by one"""
     n_scans: int
     outliers: tuple[int, ...]
+    faint: bool
+    """whether neither an outline lies on it nor any scan by itself shows it as a wall"""
     height: float
     """metres it was seen over"""
     stretches: NDArray[np.float64]
@@ -168,6 +170,7 @@ def _sheet(
     far = float(max(edges.far[e]) if e else max(faces.far[f]))
     stretches = np.concatenate([_stretches(j, frame, model) for j in f] or [np.empty((0, 2))])
     known = [j for j in f if model.faces.profiles[j].any()]
+    drawn = float(np.average(edges.at[e], weights=edges.far[e] - edges.near[e])) if e else np.nan
     if known:
         at = float(np.average(faces.at[known], weights=model.faces.weights[known]))
         n_scans = int(model.faces.scans[known].max())
@@ -175,7 +178,7 @@ def _sheet(
         heights = model.faces.heights[known]
         height = float(heights[:, 1].max() - heights[:, 0].min())
     else:
-        at = float(np.average(edges.at[e], weights=edges.far[e] - edges.near[e]))
+        at = drawn
         n_scans, sigma, height = 0, params.sigma_unseen_m, 0.0
     members: frozenset[int] = frozenset()
     outliers: tuple[int, ...] = ()
@@ -186,6 +189,9 @@ def _sheet(
         at, sigma, outliers = fused.position_m, fused.sigma_m, fused.outliers
         members = frozenset(by.tolist()) - set(outliers)
         n_scans = len(members)
+    elif known and e and len(model.strips.scans):
+        # too small to be any scan's wall by itself: as uncertain as what it is off the outline
+        at, sigma = drawn, float(np.hypot(sigma, at - drawn))
     return Sheet(
         at=at,
         facing=group.facing,
@@ -197,6 +203,7 @@ def _sheet(
         scans=members,
         n_scans=n_scans,
         outliers=outliers,
+        faint=not e and not len(mine) and len(model.strips.scans) > 0,
         height=height,
         stretches=stretches,
     )

@@ -21,6 +21,9 @@ ENOUGH, MOST = 3, 0.5
 SLOPE_RAD = 0.0015
 """Standard deviation of a wall's turn against the line of its row, radians: a line derived from a
 drifting scan of the corridor is turned by a tenth of a degree. Assumption."""
+ON_LINE_M = 0.04
+"""A front nearer to its line is the corridor's side of the wall, metres: the room's was not seen.
+No wall is thinner (plaster slabs of 50 mm, DIN EN 12859, as seen)."""
 FRONT_M = 0.7
 """A front is no further from its line than a thick wall, metres."""
 
@@ -57,8 +60,9 @@ def depth_moves(
     Notes
     -----
     A wall is the straight line of least squares through the edges on it, each with a variance that
-    grows as less of it was seen, nearly parallel to the row's. The mean depth by the rules of the
-    rooms that end there, once, is fused with it by their precisions.
+    grows as less of it was seen, nearly parallel to the row's. A front on the line itself, on the
+    corridor's side of the wall, goes to where most of the row's fronts are. The mean
+    depth by the rules of the rooms that end there, once, is fused with it by their precisions.
     """
     s, t = row.frame.local(edges.middle).T
     facing = edges.outward @ row.frame.left
@@ -70,8 +74,16 @@ def depth_moves(
         of_kind = of_row & near & (look > SQUARE_COS)
         long = np.flatnonzero(of_kind & (edges.length_m >= SHORTEST_M))
         jogs = np.flatnonzero(of_kind & (edges.length_m < SHORTEST_M))
-        walls = _on_one_wall(long, t, sigma, align_m, limit)
+        on_line = long[np.abs(t[long]) < ON_LINE_M] if kind == "front" else long[:0]
+        walls = _on_one_wall(np.setdiff1d(long, on_line), t, sigma, align_m, limit)
         main = _of_the_row(walls, edges)
+        if len(on_line) and walls:
+            longest = max(walls, key=lambda wall: float(edges.length_m[wall].sum()))
+            straight = _straight(longest, s, t, sigma)
+            edge = _with_jogs(on_line, jogs, t, edges)
+            by = ends[edge] - straight.at(along[edge])
+            keys = tuple(WallKey(kind, number, int(i)) for i in first[edges.shape[edge]])
+            parts.append(Moves(edge, by, np.full(len(edge), straight.spread_m), keys))
         sign = 1 if kind == "back" else -1
         for wall in walls:
             straight = _straight(wall, s, t, sigma)

@@ -108,5 +108,9 @@ def all_redrawn(
         off = (target.mean(axis=0) - ends[some]) @ outward
         before, behind = max(float(off.max()), 0.0), max(-float(off.min()), 0.0)
         faces.append(Face(target, ends[some], before + JOG_M, behind + JOG_M))
-    around = max((face.behind_m for face in faces), default=0.0)
-    return redrawn(polygon, [face._replace(around_m=around) for face in faces]) if faces else None
+    if not faces:
+        return None
+    moving = {edge for some in walls.values() for edge in some}
+    faces += [Face(ends[e], ends[[e]], 0.0, 0.0) for e in range(len(ends)) if e not in moving]
+    around = max(face.behind_m for face in faces)
+    return redrawn(polygon, [face._replace(around_m=around) for face in faces])

@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 from tasks.layout.placement.facing import Facing
 
+THIN_M, THICK_M = 0.06, 0.35
+"""Two faces nearer to or further from each other are not those of one wall as it was built: one is
+where its wall is not, metres. Assumption."""
+
 
 class WallKey(NamedTuple):
     """A wall as corrections name it: a side of rooms, or the front or back of some."""
@@ -64,8 +68,10 @@ def agreed(
     -----
     Several wishes for one edge count by their precisions. An edge without a wish that faces one
     that moves is the same wall's other face and moves along, by the share of its length that the
-    moving one covers: rooms off the lines make way, and no wall grows thick. Fronts take nobody
-    along: what faces them is the corridor, whose faces the lines lie on.
+    moving one covers: rooms off the lines make way, and no wall grows thick. Where the two were no
+    wall as it is built, one of them was hidden or never seen: the other stays, or makes way for the
+    thinnest wall. Fronts take nobody along: what faces them is the corridor, whose faces the lines
+    lie on.
     """
     weight = 1 / moves.sigma_m**2
     total, pull = np.zeros(len(lengths_m)), np.zeros((len(lengths_m), 2))
@@ -81,9 +87,17 @@ def agreed(
     wished = total > 0
     along = np.zeros_like(by)
     common = np.diff(facing.common_m, axis=1)[:, 0]
-    for a, b, run in zip(facing.a.tolist(), facing.b.tolist(), common, strict=True):
+    for a, b, gap, run in zip(
+        facing.a.tolist(), facing.b.tolist(), facing.gap_m.tolist(), common, strict=True
+    ):
         for lead, other in ((a, b), (b, a)):
-            if wished[lead] and not wished[other] and lead not in fronts:
-                along[other] -= by[lead].mean() * min(1.0, run / lengths_m[other])
+            if not wished[lead] or wished[other] or lead in fronts:
+                continue
+            moved = float(by[lead].mean())
+            if not THIN_M <= gap <= THICK_M:
+                left = gap - moved
+                moved = float(np.clip(left, THIN_M, THICK_M)) - left
+            if moved:
+                along[other] -= moved * min(1.0, run / lengths_m[other])
                 walls.setdefault(other, set()).update(walls[lead])
     return by + along, walls

@@ -118,6 +118,10 @@ def _layout(rows: list[tuple[object, ...]]) -> Layout:
         widths_m=np.array(columns[8], float),
         spreads_m=np.full(count, SPREAD_M),
         posteriors=np.ones(count),
+        from_posteriors=np.ones(count),
+        to_posteriors=np.ones(count),
+        undivided=np.ones(count),
+        gains=np.full(count, np.inf),
         log_p=np.zeros(count),
     )
 

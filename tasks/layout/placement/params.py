@@ -21,8 +21,16 @@ class PlacementParams(Params):
     firm_presence: float = Field(default=0.9, ge=0, le=1)
     """Presence from which a wall whose two faces were seen counts as well observed."""
     cut_posterior: float = Field(default=0.8, ge=0, le=1)
-    """Posterior that all rooms of a room to be cut need: on the presets, decoded by a grammar of
-    another building, wrong cuts had up to 0.77."""
+    """Posterior of a wall that a room is cut at: of storeys simulated for tuning, with walls taken
+    away and without, 22 of 25 missed walls decoded there had more, and one of 120 false ones had,
+    by a grammar of hospitals."""
+    join_posterior: float = Field(default=0.9, ge=0, le=1)
+    """Posterior that a wall which was seen is none, which rooms are joined at: false ones had 0.95
+    and more by grammars of the type, true ones up to 0.8."""
+    least_gain: float = 3.0
+    """Gain of a room, the mean of a storey, from which rooms are joined and cut: how much more
+    probable a grammar makes what was seen of a room than if it were of any width, in logarithms. On
+    storeys simulated for tuning grammars of the type had 4.7 and more, a hospital's up to 1.6."""
     face_sigma_m: PositiveFloat = 0.03
     """Standard deviation of a wall's face seen along all its length, metres."""
     end_sigma_m: PositiveFloat = 0.05

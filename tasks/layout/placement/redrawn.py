@@ -38,8 +38,8 @@ class Face(NamedTuple):
     whole: bool = False
     """whether the room has the wall as a whole, up to `ends`"""
     around_m: float = 0.0
-    """how far beyond its edges the room is filled, metres: around corners that move outwards; the
-    wall that comes next there cuts the rest off"""
+    """how far beyond its edges the room is filled, metres: around corners that move outwards, up to
+    the wall that comes next there"""
 
 
 def redrawn(polygon: Polygon, faces: Sequence[Face]) -> Polygon | None:
@@ -52,17 +52,22 @@ def redrawn(polygon: Polygon, faces: Sequence[Face]) -> Polygon | None:
     """
     inside: list[Polygon] = []
     outside: list[Polygon] = []
+    around: list[Polygon] = []
+    beyond: list[Polygon] = []
     for face in faces:
-        frame = LineFrame.between(*face.ends)
+        frame, reach = LineFrame.between(*face.ends), face.around_m
         for low, high in _stretches(frame, face):
-            filled_m = low - face.around_m, high + face.around_m
-            for strips, (a, b), depth in (
-                (inside, filled_m, face.before_m),
-                (outside, (low, high), -face.behind_m),
-            ):
-                corners = np.array([(a, 0.0), (b, 0.0), (b, depth), (a, depth)])
-                strips.append(Polygon(frame.building(corners)))
-    filled = shapely.union_all([polygon, *inside])
+            if face.before_m > 0:
+                inside.append(_strip(frame, low, high, face.before_m))
+            if face.behind_m > 0:
+                outside.append(_strip(frame, low, high, -face.behind_m))
+            if reach > 0 and face.before_m > 0:
+                around.append(_strip(frame, low - reach, low, face.before_m))
+                around.append(_strip(frame, high, high + reach, face.before_m))
+            if reach > 0:
+                beyond.append(_strip(frame, low - reach, high + reach, -face.behind_m - reach))
+    corners = shapely.difference(shapely.union_all(around), shapely.union_all(beyond))
+    filled = shapely.union_all([polygon, *inside, corners])
     whole = shapely.difference(filled, shapely.union_all(outside))
     opened = shapely.buffer(
         shapely.buffer(whole, -THREAD_M, join_style="mitre"), THREAD_M, join_style="mitre"
@@ -75,6 +80,11 @@ def redrawn(polygon: Polygon, faces: Sequence[Face]) -> Polygon | None:
     if len(found.interiors) != len(polygon.interiors) or not found.is_valid:
         return None
     return cleaned(shapely.simplify(found, THREAD_M))
+
+
+def _strip(frame: LineFrame, low: float, high: float, depth: float) -> Polygon:
+    """Return the rectangle along a wall that reaches so far before it, or behind it."""
+    return Polygon(frame.building(np.array([(low, 0), (high, 0), (high, depth), (low, depth)])))
 
 
 def _stretches(frame: LineFrame, face: Face) -> list[tuple[float, float]]:

@@ -53,15 +53,15 @@ def make_shapes(storey: Storey, apart: frozenset[int]) -> list[Shape]:
 
     Notes
     -----
-    Rooms are joined where one decoded room takes them all, unless the wall between them was well
-    observed, or one is cut out of the other. A room is to be cut where it takes several decoded
-    ones, all probable enough.
+    Rooms are joined where one decoded room takes them all, and what was seen between them is almost
+    surely no wall, unless one is cut out of the other. A room that takes several decoded ones is to
+    be cut at the walls between them that are probable enough.
     """
     main, polygons = storey.main_rows, storey.initial
     shapes = [Shape(p, (i,)) for i, p in enumerate(polygons) if main[i] < 0]
     for number, row in enumerate(storey.rows):
         for rooms, decoded in _groups(row, np.flatnonzero(main == number)):
-            for run, why in _runs(rooms, row, polygons, storey.params.firm_presence, apart):
+            for run, why in _runs(rooms, row, polygons, storey.undivided(number), apart):
                 shapes += _shapes_of(run, why, number, decoded, storey, apart)
     return _each_once(sorted(shapes, key=lambda shape: shape.sources), storey.rows)
 
@@ -81,10 +81,39 @@ def _shapes_of(
         whole = joined([polygons[i] for i in run], storey.params.thickest_m)
     if whole is None:
         return [Shape(polygons[i], (i,), number, _side_by_side(_best(row, i, own))) for i in run]
-    probable = storey.posteriors(number)[own] >= storey.params.cut_posterior
-    if not apart.isdisjoint(run) or not probable.all():
-        own = list(_best(row, run[0], own))
-    return [Shape(whole, tuple(run), number, _side_by_side(own), why)]
+    rooms = _side_by_side(own)
+    if apart.isdisjoint(run):
+        rooms = _at_walls(rooms, storey.probable_walls(number) & _inside(row, run))
+    if not apart.isdisjoint(run) or len(rooms) == 1:
+        rooms = _side_by_side(_best(row, run[0], own))
+    return [Shape(whole, tuple(run), number, rooms, why)]
+
+
+def _inside(row: DecodedRow, run: Sequence[int]) -> NDArray[np.bool_]:
+    """Return which boundaries some rooms have on either side, the one before each room, (n,).
+
+    What another room lies beside is that room's wall; the initial model knows it.
+    """
+    return np.array(
+        [
+            row.room_beside(k, 0) in run and row.room_beside(k, 1) in run
+            for k in range(len(row.decoded))
+        ],
+        bool,
+    )
+
+
+def _at_walls(
+    rooms: Sequence[tuple[int, ...]], probable: NDArray[np.bool_]
+) -> tuple[tuple[int, ...], ...]:
+    """Return rooms to be, those as one between which there is no wall that is probable enough."""
+    found = [rooms[0]] if rooms else []
+    for room in rooms[1:]:
+        if probable[room[0]]:
+            found.append(room)
+        else:
+            found[-1] = (*found[-1], *room)
+    return tuple(found)
 
 
 def _side_by_side(decoded: Sequence[int]) -> tuple[tuple[int, ...], ...]:
@@ -146,7 +175,7 @@ def _runs(
     rooms: list[int],
     row: DecodedRow,
     polygons: Sequence[Polygon],
-    firm: float,
+    undivided: NDArray[np.bool_],
     apart: frozenset[int],
 ) -> list[tuple[list[int], str]]:
     """Return the rooms of a group as runs to be joined, and why joining them was refused."""
@@ -154,7 +183,7 @@ def _runs(
     for a, b in pairwise(rooms):
         if a in apart or b in apart or _overlapped(row, polygons[a], polygons[b]):
             runs.append(([b], ""))
-        elif _firm_between(row, a, b, firm):
+        elif _divided_between(row, a, b, undivided):
             runs[-1] = (runs[-1][0], CONTRADICTS)
             runs.append(([b], CONTRADICTS))
         else:
@@ -175,15 +204,15 @@ def _overlapped(row: DecodedRow, a: Polygon, b: Polygon) -> bool:
     return bool(min(a1, b1) - max(a0, b0) > BESIDE * min(a1 - a0, b1 - b0))
 
 
-def _firm_between(row: DecodedRow, a: int, b: int, firm: float) -> bool:
-    """Whether a wall between two rooms was seen from both sides and surely is one."""
-    one_sided = np.isnan(row.line_faces_m).any(axis=1)
-    sure = ~one_sided & (row.line_presence >= firm)
+def _divided_between(row: DecodedRow, a: int, b: int, undivided: NDArray[np.bool_]) -> bool:
+    """Whether what was seen between two rooms may be a wall after all."""
     sides = np.flatnonzero(
         (row.standing[:-1] == a) & (row.standing[1:] == b)
         | (row.standing[:-1] == b) & (row.standing[1:] == a)
     )
-    return bool(sure[sides].any())
+    at = row.interval_m[sides, 1]
+    within = np.searchsorted(row.chain.observed_m[1:-1], at, side="right")
+    return not bool(undivided[within].all())
 
 
 def _each_once(shapes: list[Shape], rows: list[DecodedRow]) -> list[Shape]:

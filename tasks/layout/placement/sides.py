@@ -48,6 +48,7 @@ def find_sides(
     shape_of: NDArray[np.int64],
     partition_m: float,
     on_wall_m: float,
+    firm_presence: float,
 ) -> Sides:
     """Return which edges lie on the side walls of each row's rooms.
 
@@ -61,11 +62,15 @@ def find_sides(
         Thickness of the grammar's partitions: where a face that was not seen is expected.
     on_wall_m : float
         An edge nearer to a wall's face lies on it.
+    firm_presence : float
+        Presence from which a wall whose two faces were seen is well observed.
 
     Notes
     -----
     The outline right beside a wall has a side on it: where none is as near, the longest one no
-    further than ASTRAY_M is it, and was put elsewhere in the initial model.
+    further than ASTRAY_M is it, and was put elsewhere in the initial model. Where a short one lies
+    on a well-observed wall and a longer one no further before it, furniture hides the wall for most
+    of the room's depth: these are its side as well.
     """
     found, at = [np.zeros((0, 4), np.int64)], [np.zeros((0, 2))]
     for number, row in enumerate(rows):
@@ -73,6 +78,7 @@ def find_sides(
         ends = row.frame.local(edges.ends)[..., 0]
         of_row = stands[number][edges.shape] & (t > 0)
         facing = edges.outward @ row.frame.along
+        firm = row.firm(firm_presence)
         for k, cut in enumerate(row.cuts):
             if cut == HIDDEN:
                 continue
@@ -90,9 +96,14 @@ def find_sides(
                     on = away <= on_wall_m
                     room = row.room_beside(k, side)
                     own = edges.shape == shape_of[room] if room >= 0 else np.zeros(len(s), bool)
-                    if not (on & own).any() and (own & (away <= ASTRAY_M)).any():
-                        astray = np.where(own & (away <= ASTRAY_M), edges.length_m, 0.0)
+                    astray = np.where(own & (away <= ASTRAY_M), edges.length_m, 0.0)
+                    if not (on & own).any() and astray.any():
                         on[astray.argmax()] = True
+                    elif firm[k] and not np.isnan(row.faces_m[k, side]):
+                        # the room's side is where most of it is: what stands before is furniture
+                        before = astray * ((1 - 2 * side) * (face - s) > 0) * ~on
+                        if before.max(initial=0.0) > astray[on].sum():
+                            on |= before > 0
                 edge = np.flatnonzero(on)
                 found.append(np.column_stack([np.full((len(edge), 3), (number, k, side)), edge]))
                 at.append(ends[edge])

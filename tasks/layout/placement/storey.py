@@ -34,6 +34,13 @@ class Storey:
         return overlap_m2(self.initial)
 
     @cached_property
+    def fits(self) -> bool:
+        """Whether the grammar explains the storey well enough to say which rooms there are."""
+        gain = sum(float(self.layout.gains[row.decoded[0]]) for row in self.rows)
+        rooms = sum(len(row.decoded) for row in self.rows)
+        return gain >= self.params.least_gain * rooms
+
+    @cached_property
     def known(self) -> KnownWalls:
         """The walls that the grammar knows the place of, if it is of this building."""
         ids = [str(self.layout.line_ids[row.decoded[0]]) for row in self.rows]
@@ -44,9 +51,15 @@ class Storey:
         """The row that each initial room stands on longest, (n,), -1 for none."""
         return main_rows(self.rows, len(self.initial))
 
-    def posteriors(self, row: int) -> NDArray[np.float64]:
-        """Return the posterior of each room of a row."""
-        return self.layout.posteriors[self.rows[row].decoded]
+    def probable_walls(self, row: int) -> NDArray[np.bool_]:
+        """Return which boundaries of a row are probably walls, the one before each room, (n,)."""
+        found = self.layout.from_posteriors[self.rows[row].decoded]
+        return self.fits & (found >= self.params.cut_posterior)
+
+    def undivided(self, row: int) -> NDArray[np.bool_]:
+        """Return which rooms of a row no wall seen within them divides, almost surely, (n,)."""
+        found = self.layout.undivided[self.rows[row].decoded]
+        return self.fits & (found >= self.params.join_posterior)
 
     def rule_depth_m(self, row: int, rooms: list[int]) -> tuple[float, float]:
         """Return the mean depth and spread by the rules of some rooms of a row, NaN for any."""

@@ -55,7 +55,15 @@ def wishes_of(
     for i, shape in enumerate(shapes):
         shape_of[list(shape.sources)] = i
     seen = seen_share(edges, [shape.sources for shape in shapes], storey.walls)
-    sides = find_sides(rows, edges, stands, shape_of, storey.grammar.partition_m, params.on_wall_m)
+    sides = find_sides(
+        rows,
+        edges,
+        stands,
+        shape_of,
+        storey.grammar.partition_m,
+        params.on_wall_m,
+        params.firm_presence,
+    )
     chains = with_end_walls(rows, sides, seen, params.face_sigma_m, params.end_sigma_m)
     found = _boundaries(storey, chains, sides, edges)
     if params.widths == "observed":

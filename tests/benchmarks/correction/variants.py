@@ -15,10 +15,15 @@ HOSPITAL = "hospital"
 ORACLE = "oracle"
 """True rooms with true widths, placed like decoded ones: what is left if decoding never errs."""
 BOUNDLESS = 1e9
-NO_GUARD: Settings = {"place.limit": BOUNDLESS, "place.most_wrong": 1.0}
+NO_GUARD: Settings = {
+    "place.limit": BOUNDLESS,
+    "place.most_wrong": 1.0,
+    "place.least_gain": -BOUNDLESS,
+}
 PAPER: Settings = {
     "decode.decoder": "plain",
     "decode.transitions": "paper",
+    "extract.joints": "ignored",
     "place.widths": "replace",
     **NO_GUARD,
 }
@@ -56,6 +61,8 @@ INGREDIENTS = (
     Variant("replace", "rule width replaces", SAME, {"place.widths": "replace"}),
     Variant("observed", "observed width stays", SAME, {"place.widths": "observed"}),
     Variant("no-guard", "nothing refused", SAME, NO_GUARD),
+    Variant("no-joints", "walls not seen left out", SAME, {"extract.joints": "ignored"}),
+    Variant("no-joins", "rooms never joined", SAME, {"place.join_posterior": 1.0}),
     Variant("no-cuts", "rooms never cut in two", SAME, {"place.cut_posterior": 1.0}),
     Variant("all-cuts", "rooms cut wherever decoded", SAME, {"place.cut_posterior": 0.0}),
     Variant("wrong-no-guard", "a hospital's, nothing refused", WRONG, NO_GUARD),
@@ -65,8 +72,8 @@ INGREDIENTS = (
 
 
 def disturbances() -> tuple[Variant, ...]:
-    """Return the initial model, the paper's way and ours with walls missed and imagined."""
-    bases = [v for v in (*MAIN, *INGREDIENTS) if v.name in (NONE, SAME, "all-cuts", "paper")]
+    """Return all main variants, and ours with all cuts, with walls missed and imagined."""
+    bases = [*MAIN, *(v for v in INGREDIENTS if v.name == "all-cuts")]
     return tuple(
         Variant(
             f"{base.name}-{what}{share:.0%}".rstrip("%"),

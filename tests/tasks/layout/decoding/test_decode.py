@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy.stats import lognorm, norm
 
 from grammars.model import Grammar, Part, Rule
 from storage.layout import HIDDEN, LINE_END
@@ -236,3 +237,51 @@ def test_a_wrong_grammar_leaves_rooms_unexplained_where_they_were_seen():
     assert (~layout.explained).mean() > 0.8
     walls = sum(len(line[1]) for line, *_ in truth)
     assert (layout.to_cuts >= 0).sum() > 0.8 * walls
+
+
+def test_rooms_side_by_side_agree_on_the_wall_between_them_and_the_ends_are_sure():
+    rng = np.random.default_rng(5)
+    lines = [drawn(rng, 0.3, 0.2)[0] for _ in range(4)]
+    for decoder in ("segmental", "plain"):
+        layout = decode(observed(lines), grammar(), DecodeParams(decoder=decoder))
+        inner = layout.to_cuts != LINE_END
+        after = np.roll(layout.from_posteriors, -1)
+        assert layout.to_posteriors[inner].tolist() == after[inner].tolist()
+        assert (layout.to_posteriors[~inner] == 1).all()
+        assert (layout.from_posteriors[layout.from_cuts == LINE_END] == 1).all()
+        assert ((layout.undivided > 0) & (layout.undivided <= 1)).all()
+
+
+def test_the_plain_decoder_says_of_observed_walls_what_is_observed():
+    line = seen(9.9, 2.9, 7.0, presence=0.7)
+    layout = decode(observed([line]), grammar(), DecodeParams(decoder="plain"))
+    cuts = layout.to_cuts >= 0
+    assert cuts.sum() == 2
+    assert layout.to_posteriors[cuts].tolist() == [0.7, 0.7]
+
+
+def test_a_hidden_wall_of_a_unit_is_as_probable_as_the_rules_that_have_one_there():
+    rules = (RULES[0], RULES[3])
+    even = np.full((2, 2), 0.5)
+    params = DecodeParams(decoder="plain", near_m=0.1)
+    layout = decode(observed([seen(12.0)]), grammar(rules, even), params)
+    likely = [r.p_apriori * norm.pdf(12.0, r.width_m, params.plain.sigma_m) for r in rules]
+    assert layout.classes.tolist() == ["executive", "assistant", "executive"]
+    assert layout.to_posteriors[:-1] == pytest.approx(likely[1] / sum(likely))
+
+
+def test_a_grammar_gains_what_it_explains_over_rooms_of_any_width():
+    rng = np.random.default_rng(6)
+    lines = observed([drawn(rng, 0.1, 0.1)[0] for _ in range(6)])
+    other = tuple(
+        Rule(r.id, tuple(Part(p.class_, 1.3 * p.width_m, p.spread_m) for p in r.parts), r.p_apriori)
+        for r in RULES
+    )
+    right, wrong = (decode(lines, g, DecodeParams()) for g in (grammar(), grammar(other)))
+    best = right.hypotheses == 0
+    assert (right.gains[best] > 0).all()
+    assert np.unique(right.gains).sum() > np.unique(wrong.gains).sum()
+    one = decode(observed([seen(2.9)]), grammar(RULES[:1], np.ones((1, 1))), DecodeParams(
+        unexplained="forbidden", segmental=SegmentalParams(p_seen=1.0)))  # fmt: skip
+    known = RULES[0].p_apriori * norm.pdf(2.9, 2.9, np.sqrt(0.15**2 + 2 * 0.05**2))
+    assert one.gains[0] == pytest.approx(np.log(known / lognorm.pdf(2.9, 0.8, scale=4.0)))

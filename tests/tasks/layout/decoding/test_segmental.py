@@ -1,5 +1,6 @@
 """The segmental decoder against enumeration of every way to read a line, written apart from it."""
 
+from collections import Counter
 from itertools import combinations, pairwise, product
 
 import numpy as np
@@ -12,8 +13,19 @@ from storage.layout import HIDDEN, LINE_END
 from tasks.layout.decoding.hmm import viterbi
 from tasks.layout.decoding.kbest import best_decodings, rooms_of
 from tasks.layout.decoding.plain import PlainParams, make_plain
-from tasks.layout.decoding.posterior import posterior, room_posteriors
-from tasks.layout.decoding.segmental import SUREST, SegmentalParams, make_segmental, make_walls
+from tasks.layout.decoding.posterior import (
+    posterior,
+    room_posteriors,
+    undivided,
+    wall_posteriors,
+)
+from tasks.layout.decoding.segmental import (
+    SUREST,
+    SegmentalParams,
+    as_seen,
+    make_segmental,
+    make_walls,
+)
 from tasks.layout.decoding.states import Unexplained, make_states
 
 PARAMS = SegmentalParams(rarest_run=1e-2, p_seen=0.8, spurious_per_m=0.1)
@@ -189,6 +201,78 @@ def test_posteriors_are_the_shares_of_all_readings(case):
                     )
                 )
         assert room_posteriors(m, walls, decoding, sums) == pytest.approx(asked)
+
+
+def hidden_walls(m, chain, seen, a, b):
+    """Return mean and deviation of the walls within rooms, the length between two walls given.
+
+    Of the normal variables (error of the first wall, widths, error of the second) those that add
+    up to the length: conditioned by their covariance.
+    """
+    s, p = m.states, m.params
+    ends = np.array([0.0, *seen["cuts"], seen["length"]])
+    sigmas = np.array([p.end_sigma_m, *seen["sigmas"], p.end_sigma_m])
+    mean = np.array([0.0, *s.widths[list(chain)], 0.0])
+    covariance = np.diag([sigmas[a], *s.spreads[list(chain)], sigmas[b]]) ** 2
+    upto = np.tri(len(chain) + 2)[1:-2]
+    whole = np.ones(len(mean))
+    gain = upto @ covariance @ whole / (whole @ covariance @ whole)
+    at = ends[a] + upto @ mean + gain * (ends[b] - ends[a] - mean.sum())
+    left = upto @ covariance @ upto.T - np.outer(gain, whole @ covariance @ upto.T)
+    return list(zip(at, np.sqrt(np.diag(left)), strict=True))
+
+
+@pytest.mark.parametrize("near_m", [0.2, 0.6])
+def test_walls_posteriors_are_those_of_all_readings_that_have_one_there(case, near_m):
+    m, seen, walls, expected = case
+    p = np.exp(np.array([e[0] for e in expected]))
+    p /= p.sum()
+    sums = posterior(m, walls)
+    ends = np.array([0.0, *seen["cuts"], seen["length"]])
+    divides, of_run = np.zeros(len(ends)), Counter()
+    for q, (_, ws, chains) in zip(p, expected, strict=True):
+        divides[list(ws)] += q
+        for pair, chain in zip(pairwise(ws), chains, strict=True):
+            of_run[(*pair, chain)] += q
+    # weight, mean and deviation of every hidden wall of every reading
+    all_hidden = np.array(
+        [
+            (q, *wall)
+            for (a, b, chain), q in of_run.items()
+            for wall in hidden_walls(m, chain, seen, a, b)
+        ]
+    )
+    weight, mean, sigma = all_hidden.T
+    hidden = 0
+    for decoding in best_decodings(m, walls, 12):
+        rooms = rooms_of(m, walls, decoding)
+        found = wall_posteriors(m, walls, rooms, sums, near_m)
+        assert found[[0, -1]].tolist() == [1, 1]
+        for k, (cut, at) in enumerate(zip(rooms.cuts, rooms.bounds_m, strict=True)):
+            if cut >= 0:
+                assert found[k] == pytest.approx(divides[cut + 1])
+            elif cut == HIDDEN:
+                hidden += 1
+                low, high = at - near_m, at + near_m
+                near = stats.norm.cdf(high, mean, sigma) - stats.norm.cdf(low, mean, sigma)
+                asked = divides[1:-1][np.abs(ends[1:-1] - at) <= near_m].sum() + weight @ near
+                assert found[k] == pytest.approx(min(asked, 1), abs=1e-9)
+        for k, (low, high) in enumerate(pairwise(rooms.bounds_m)):
+            within = [i + 1 for i, c in enumerate(seen["cuts"]) if low < c < high]
+            whole = undivided(walls, rooms, sums)[k]
+            assert whole == pytest.approx(1 - divides[within].max(initial=0.0), abs=1e-9)
+    assert hidden
+
+
+def test_without_a_grammar_a_line_is_as_probable_as_its_rooms_unexplained():
+    m = MODELS["all of it"]
+    none = m.states.explained
+    for seed in range(3):
+        seen = line(seed)
+        expected = enumerated(m, seen, longest=1)
+        log_p = next(x for x, ws, cs in expected if len(ws) == 5 and cs == ((none,),) * 4)
+        chain = m.states.log_initial[none] + 3 * m.states.log_transitions[none, none]
+        assert as_seen(m, make_walls(m, **seen)) == pytest.approx(log_p - chain)
 
 
 def test_where_a_hidden_wall_stands_is_summed_over():

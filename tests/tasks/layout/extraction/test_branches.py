@@ -219,6 +219,29 @@ def test_scans_of_either_face_count_once_each():
     assert found.at == pytest.approx([7.1])
 
 
+def test_a_face_that_no_scan_shows_by_itself_yields_to_one_that_an_outline_lies_on():
+    scans = [scan_of(6.85, DOWN), scan_of(7.07, UP)]
+    found = faces((6.85, DOWN), (7.02, DOWN), (7.07, UP))
+    walls = branches(found, rooms(box(0, FRONT, 6.85, DEPTH)), scans)
+    assert np.isclose(walls.faces, [6.85, 7.07]).all(axis=1).any()
+    # ...but furniture yields to what is as thick as a partition
+    hidden = faces((6.6, DOWN), (6.95, DOWN), (7.07, UP))
+    walls = branches(hidden, rooms(box(0, FRONT, 6.6, DEPTH)), [scan_of(6.6, DOWN), scans[1]])
+    assert np.isclose(walls.faces, [6.95, 7.07]).all(axis=1).any()
+
+
+def test_a_face_too_small_for_any_scan_leaves_a_wall_where_its_room_ends():
+    scrap = faces((7.08, DOWN, 1.0, 1.6, 0.0))
+    ends = rooms(box(0, FRONT, 7.0, DEPTH))
+    elsewhere = [scan_of(15.0, UP)]
+    found = branches(scrap, ends, elsewhere)
+    face = found.faces[np.abs(found.at - 7) < 0.2]
+    assert face == pytest.approx(np.array([[7.0, np.nan]]), nan_ok=True)
+    # as uncertain as the two are apart, and the thickness of a wall seen from one side
+    sigma = np.sqrt(0.02**2 + 0.08**2 + (PARTITION[1] / 2) ** 2)
+    assert found.sigma[np.abs(found.at - 7) < 0.2] == pytest.approx([sigma])
+
+
 def test_fusion_is_the_inverse_variance_mean():
     at, sigma = np.array([1.0, 1.02, 0.99]), np.array([0.01, 0.02, 0.04])
     found = fuse(at, sigma, np.arange(3))

@@ -31,7 +31,15 @@ def row():
 
 def backs(depths, rule=np.nan):
     """Return how far the back of each room moves, NaN where none is asked to."""
-    rooms = [box(4 * i, 0.2, 4 * i + 3.9, depth) for i, depth in enumerate(depths)]
+    return moved("back", [box(4 * i, 0.2, 4 * i + 3.9, d) for i, d in enumerate(depths)], rule)
+
+
+def fronts(places):
+    """Return how far the front of each room moves, NaN where none is asked to."""
+    return moved("front", [box(4 * i, t, 4 * i + 3.9, 5.0) for i, t in enumerate(places)])
+
+
+def moved(kind, rooms, rule=np.nan):
     edges, n = edges_of(rooms), len(rooms)
     deep, spread = np.full(n, rule), np.full(n, 0.03 if rule > 0 else np.nan)
     seen = np.ones(len(edges))
@@ -40,7 +48,7 @@ def backs(depths, rule=np.nan):
     )
     found = np.full(n, np.nan)
     for edge, by, wall in zip(moves.edge, moves.by_m, moves.wall, strict=True):
-        if wall.kind == "back":
+        if wall.kind == kind:
             found[edges.shape[edge]] = by.mean()
             assert wall.number == edges.shape[edge]  # a fault of one room leaves the others alone
     return found
@@ -61,6 +69,18 @@ def test_two_rooms_before_their_row_s_wall_have_a_wall_of_their_own():
 
 def test_a_rule_that_knows_the_smaller_depth_keeps_it():
     assert backs([5.0, 5.0, 4.7, 5.0], rule=4.7)[2] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_front_on_the_corridor_s_side_of_its_wall_goes_to_the_row_s_fronts():
+    assert fronts([0.2, 0.0, 0.2, 0.03]) == pytest.approx([0, -0.2, 0, -0.17], abs=1e-9)
+
+
+def test_a_front_off_the_line_has_a_wall_before_it_and_stays():
+    assert fronts([0.2, 0.05, 0.2]) == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+def test_fronts_on_the_line_stay_where_no_room_shows_the_other_side():
+    assert np.isnan(fronts([0.0, 0.0])).all()
 
 
 def test_a_straight_wall_is_the_least_squares_line_with_a_prior_on_its_turn():

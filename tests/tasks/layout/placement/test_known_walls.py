@@ -151,6 +151,22 @@ def test_what_is_drawn_anew_keeps_holes_and_refuses_to_lose_one():
     assert redrawn(ring, [face._replace(before_m=8.0)]) is None
 
 
+def test_a_corner_that_moves_outwards_is_filled_up_to_the_next_wall_and_no_further():
+    ell = Polygon([(0, 0), (6, 0), (6, 3), (4, 3), (4, 5), (0, 5)])
+    edges = edges_of([ell]).ends
+    places = {"low": (1, 0), "right": (0, 6), "step": (1, 3), "inner": (0, 4), "left": (0, 0)}
+    of = {
+        name: edges[np.isclose(edges[..., axis], at).all(axis=1)]
+        for name, (axis, at) in places.items()
+    }
+    low, right = np.array([(0.0, -0.2), (6.0, -0.2)]), np.array([(6.3, 0.0), (6.3, 3.0)])
+    moves = [Face(low, of["low"], 0.35, 0.15), Face(right, of["right"], 0.45, 0.15)]
+    stay = [Face(of[name][0], of[name], 0.0, 0.0) for name in ("step", "inner", "left")]
+    found = redrawn(ell, [face._replace(around_m=0.4) for face in (*moves, *stay)])
+    expected = Polygon([(0, -0.2), (6.3, -0.2), (6.3, 3), (4, 3), (4, 5), (0, 5)])
+    assert found.symmetric_difference(expected).area < 0.02
+
+
 def test_a_grammar_of_another_building_moves_nothing():
     plain = replace(GRAMMAR, lines=())
     assert len(known_walls(plain, [row_on((1, 0), (19, 0))], ["n"])) == 0

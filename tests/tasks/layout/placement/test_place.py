@@ -543,13 +543,54 @@ def test_a_side_that_the_initial_model_put_elsewhere_goes_to_its_wall(upper):
     )
 
 
-def test_a_room_is_not_cut_into_rooms_that_are_not_probable():
+def test_a_room_is_not_cut_at_a_wall_that_is_not_probable():
     true, _, args = case_of(storey("wing"), seed=5, missed=0.3)
     rooms, walls, observed, layout, grammar = args
-    unsure = replace(layout, posteriors=np.full(len(layout), 0.7))
+    unsure = replace(layout, from_posteriors=np.full(len(layout), 0.7))
     out = place_rooms(rooms, walls, observed, unsure, grammar, PARAMS)
     assert len(rooms) < len(true)
     assert len(out) == len(rooms)
+
+
+def test_rooms_are_not_joined_where_a_wall_seen_between_them_may_be_one():
+    true, _, args = case_of(storey("wing"), seed=5, spurious=0.3)
+    rooms, walls, observed, layout, grammar = args
+    assert len(rooms) > len(true)
+    for share, expected in ((0.95, len(true)), (0.5, len(rooms))):
+        said = replace(layout, undivided=np.full(len(layout), share))
+        assert len(place_rooms(rooms, walls, observed, said, grammar, PARAMS)) == expected
+
+
+@pytest.mark.parametrize("fault", ["missed", "spurious"])
+def test_a_grammar_that_hardly_explains_the_rooms_does_not_say_which_there_are(fault):
+    true, _, args = case_of(storey("wing"), seed=5, **{fault: 0.3})
+    rooms, walls, observed, layout, grammar = args
+    per_line = np.array([(layout.line_ids == name).sum() for name in layout.line_ids])
+    for gain, expected in ((3.5, len(true)), (2.5, len(rooms))):
+        said = replace(layout, gains=gain * per_line)
+        assert len(place_rooms(rooms, walls, observed, said, grammar, PARAMS)) == expected
+
+
+def test_a_room_is_not_cut_at_a_wall_it_has_with_another_that_stands_before_it():
+    """An L about a small room: the small one's wall is no wall of the L's."""
+    cells = [Polygon([(0, 0), (2, 0), (2, 2), (5, 2), (5, 5), (0, 5)]), box(2.1, 0, 5, 1.9)]
+    rooms, walls = initial_model(cells)
+    frame = np.array([[0.0, 0.0]]), np.array([[5.0, 0.0]])
+    observed = Observations(
+        line_ids=np.array(["l0"]), starts=frame[0], ends=frame[1],
+        end_sigma_m=np.full((1, 2), np.nan), end_faces_m=np.full((1, 2, 2), np.nan),
+        lines=np.zeros(1, int), cut_m=np.array([2.05]), sigma_m=np.array([0.03]),
+        faces_m=np.array([[2.0, 2.1]]), scans=np.ones(1, int), presence=np.array([0.99]),
+        interval_lines=np.zeros(2, int), from_m=np.array([0, 2.05]), to_m=np.array([2.05, 5]),
+        rooms=np.array([0, 1]), depth_m=np.full(2, np.nan),
+    )  # fmt: skip
+    layout = true_layout(observed, rooms, [box(0, 0, 2, 5), box(2.1, 0, 5, 5)], ["a"] * 2, 0.1, 0.3)
+    assert len(layout) == 2 and layout.to_cuts[0] == 0
+    rules = tuple(Rule(r, (Part("a", 2.5, 0.5),), 0.5) for r in layout.rules)
+    grammar = Grammar("t", "office", "", (), True, ("a",), rules, np.full((2, 2), 0.5), 0.1, 0.02)
+    wide = replace(observed, rooms=np.array([0, 0]))
+    assert len(place_rooms(rooms, walls, observed, layout, grammar, PARAMS)) == 2
+    assert len(place_rooms(rooms, walls, wide, layout, grammar, PARAMS)) == 3
 
 
 def test_a_tilted_side_is_set_square_on_its_line():

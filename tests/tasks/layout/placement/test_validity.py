@@ -89,6 +89,21 @@ def test_what_faces_a_moved_wall_moves_along_by_the_share_it_covers():
     assert walls == {back: {BACK}, face: {BACK}}
 
 
+@pytest.mark.parametrize(
+    ("gap_m", "by_m", "left_m"),
+    # beside no wall as it is built the other face stays; where none would be left it makes way
+    [(0.5, 0.3, 0.2), (0.0, -0.2, 0.2), (0.02, -0.02, 0.06), (0.2, 0.1, 0.2), (0.2, -0.1, 0.2)],
+)
+def test_a_face_that_was_no_wall_with_the_moved_one_stays(gap_m, by_m, left_m):
+    polygons = [box(0, 0, 3, 5), box(3 + gap_m, 0, 7, 5)]
+    edges = edges_of(polygons)
+    side, other = edge(polygons, 0, (1, 0)), edge(polygons, 1, (-1, 0))
+    moves, _ = agreed(wish(side, by_m), facing_edges(edges, 0.5), edges.length_m)
+    left = gap_m - moves[side].mean() - moves[other].mean()
+    assert moves[side] == pytest.approx(by_m)
+    assert left == pytest.approx(left_m)
+
+
 def test_fronts_take_nobody_along():
     polygons = [*ROW, BEHIND]
     edges = edges_of(polygons)

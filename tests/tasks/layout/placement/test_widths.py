@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grammars.model import Module
-from tasks.layout.placement.crowd import fuse_decoded
 from tasks.layout.placement.guard import contradicted, fuse_guarded
 from tasks.layout.placement.modules import nearest_modules, with_modules
 from tasks.layout.placement.widths import Chain, Tie, fuse_chain, fuse_chains, replace_chain
@@ -149,7 +148,7 @@ def test_a_grammar_that_most_firm_walls_contradict_has_no_say_at_all():
     assert some.tolist() == [True, True, True, False, False]
 
 
-# --- modules and the crowd
+# --- modules
 
 
 def test_a_width_near_modules_keeps_to_them_and_one_between_does_not():
@@ -164,34 +163,3 @@ def test_modules_speak_only_for_rooms_without_a_rule():
     with_module = with_modules(one, Module(2.4, 0.03))
     assert with_module.width_m == pytest.approx([4.9, 4.8])
     assert with_modules(one, None) is one
-
-
-def test_volunteers_of_the_same_rooms_are_combined_by_inverse_variance():
-    rooms, sigmas = ("a", "b"), ([0.1, 0.1, 0.1], [0.1, 0.2, 0.1])
-    agreed = fuse_decoded([rooms] * 2, [np.array([0, 3.0, 6]), np.array([0, 3.5, 6.2])],
-                          [np.array(s) for s in sigmas])  # fmt: skip
-    mean = (3.0 / 0.01 + 3.5 / 0.04) / (1 / 0.01 + 1 / 0.04)
-    assert agreed.position_m == pytest.approx([0, mean, 6.1])
-    assert agreed.sigma_m[0] == pytest.approx(0.1 / np.sqrt(2))
-    assert agreed.outliers == ((), (), ()) and agreed.others == ()
-
-
-def test_a_volunteer_who_is_off_is_named_and_one_with_other_rooms_has_no_say():
-    at = [np.array([0, 3 + e, 6.0]) for e in (0.01, -0.01, 0.0, 1.5)] + [np.array([0, 6.0])]
-    rules = [("a", "b")] * 4 + [("c",)]
-    agreed = fuse_decoded(rules, at, [np.full(len(a), 0.05) for a in at])
-    assert agreed.rules == ("a", "b")
-    assert agreed.outliers == ((), (3,), ())
-    assert agreed.others == (4,)
-    assert agreed.position_m == pytest.approx([0, 3, 6], abs=0.02)
-
-
-def test_a_wall_that_no_volunteer_saw_is_unknown():
-    agreed = fuse_decoded([("a",)], [np.array([0, NONE])], [np.array([0.1, 0.1])])
-    assert agreed.position_m == pytest.approx([0, NONE], nan_ok=True)
-    assert agreed.sigma_m[1] == np.inf
-
-
-def test_boundaries_that_do_not_fit_the_rooms_failure():
-    with pytest.raises(ValueError, match="volunteer 0: expected 3 boundaries, got 2"):
-        fuse_decoded([("a", "b")], [np.zeros(2)], [np.ones(2)])
