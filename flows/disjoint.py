@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict
 from grammars.library import find_grammar
 from grammars.reading import read_grammar
 from storage.errors import InputError
+from storage.forest import open_forest
 from storage.plan_digest import plan_digest
 from tasks.evaluation.truth import read_truth
 
@@ -57,6 +58,14 @@ def learnt_by(grammar: str) -> list[Learnt]:
     return [
         Learnt(building=o.building, storey=o.storey, source=str(path), digest=o.digest)
         for o in read_grammar(path).learnt_from
+    ]
+
+
+def learnt_by_forest(path: Path) -> list[Learnt]:
+    """Return the storeys a forest was trained on, as its provenance says."""
+    return [
+        Learnt(building=s.building, storey=s.storey, source=str(path), digest=s.digest)
+        for s in open_forest(path).provenance.storeys
     ]
 
 

@@ -10,7 +10,8 @@ from prefect import flow
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, NonNegativeInt
 
 from flows import progress
-from flows.disjoint import Learnt, ScoredStorey, check_disjoint, learnt_by
+from flows.disjoint import Learnt, ScoredStorey, check_disjoint, learnt_by, learnt_by_forest
+from flows.forests import used
 from flows.outcomes import Outcome, RepeatsFailed
 from flows.params import MapSenseParams
 from flows.plans import true_plan
@@ -79,7 +80,9 @@ class ExperimentRequest(BaseModel):
         """Return what was learnt from by anything that maps a storey."""
         named = (_of_storey(params, storey).grammar for params in self.variants.values())
         grammars = sorted({grammar for grammar in named if grammar is not None})
-        return [*self.learnt, *(each for name in grammars for each in learnt_by(name))]
+        taught = [each for name in grammars for each in learnt_by(name)]
+        trained = [each for path in used() for each in learnt_by_forest(path)]
+        return [*self.learnt, *taught, *trained]
 
 
 def _of_storey(params: MapSenseParams, storey: ScoredStorey) -> MapSenseParams:

@@ -55,6 +55,12 @@ def gather(experiment: str, title: str, repeats: int) -> None:
         display.expect(experiment, title, repeats)
 
 
+def advance(key: str, last: str) -> None:
+    """Say that a step of what has a bar was done, and which."""
+    for display in _displays:
+        display.advance(key, last)
+
+
 def ended(place: Place, experiment: str) -> None:
     """Say that a repeat of an experiment has ended: it is one of many, its bar goes."""
     for display in _displays:

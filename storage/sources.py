@@ -1,4 +1,7 @@
-"""What a person brings: the file or folder one scan is read from."""
+"""What stages read besides artifacts: a person's scan, a plan, a grammar, a forest."""
+
+from hashlib import sha256
+from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
@@ -16,3 +19,15 @@ class Source(BaseModel):
     """Hash over the scan's files: their names relative to `path` and their bytes."""
     size_bytes: int
     """Bytes of all its files."""
+
+
+def file_source(path: Path, name: str) -> Source:
+    """Return one file as a stage's input: named, and known by the hash of its bytes.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    data = path.read_bytes()
+    return Source(name=name, path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data))

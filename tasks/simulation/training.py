@@ -1,16 +1,26 @@
-"""Simulated storeys to learn grammars from; no preset is among them, and none is ever scored on."""
+"""Simulated storeys to learn from; no preset is among them, and none is ever scored on.
 
-from collections.abc import Mapping
+Grammars learn from bare storeys, each of a building's whole length; what tells doors and furniture
+apart learns from small furnished ones and their scans.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from storage.plan import Plan
+from tasks.simulation.campaign import CampaignParams
 from tasks.simulation.furnishing import FurnishingParams
 from tasks.simulation.layouts.double_loaded import DoubleLoadedParams
 from tasks.simulation.layouts.irregular import IrregularParams
 from tasks.simulation.layouts.open_plan import OpenPlanParams
 from tasks.simulation.layouts.ring import RingParams
+from tasks.simulation.openings import OpeningParams
 from tasks.simulation.plan import StoreyParams, make_storey
+from tasks.simulation.sensor import SensorParams
+from tasks.simulation.volunteers import VolunteerParams
 
 STOREYS = 16
 """Storeys of each kind of building, each a building of its own."""
@@ -26,6 +36,32 @@ BARE = FurnishingParams(
 """Hardly any furniture: walls alone teach a grammar, and furnishing takes longer than building."""
 FIRST_SEEDS: Mapping[str, int] = {"office": 1000, "institute": 2000}
 """Seed of the first storey of each kind; the rest count on from it."""
+FURNISHED_SEED = 3000
+"""Seed of the first furnished storey; the rest count on from it."""
+FURNISHED: Sequence[Mapping[str, Any]] = (
+    {"layout": "small"},
+    {"layout": "double_loaded", "double_loaded": DoubleLoadedParams(modules=8)},
+    {"layout": "open_plan", "open_plan": OpenPlanParams(modules=10)},
+    {"layout": "irregular", "irregular": IrregularParams(main_modules=8, wing_modules=5)},
+    {"layout": "small"},
+    {"layout": "double_loaded", "double_loaded": DoubleLoadedParams(modules=9)},
+    {"layout": "open_plan", "open_plan": OpenPlanParams(modules=11)},
+    {"layout": "irregular", "irregular": IrregularParams(main_modules=8, wing_modules=6)},
+    {"layout": "small"},
+    {"layout": "double_loaded", "double_loaded": DoubleLoadedParams(modules=10)},
+)
+"""The furnished storeys: 9 to 17 rooms each."""
+DOORS_M = ((0.686, 0.811, 0.936), (0.811, 0.936, 1.061), (0.936, 1.061, 1.186))
+"""Clear widths of doors, narrow, usual and wide: DIN 18101's leaves from 735 to 1235 mm."""
+HEADS_M = (1.968, 2.093)
+"""Clear heights of doors: DIN 18101's wall openings of 2000 and 2125 mm less 32 mm of frame."""
+STATES = ((0.45, 0.2, 0.35), (0.25, 0.25, 0.5), (0.35, 0.4, 0.25))
+"""Shares of doors that are open, ajar and shut. Assumption."""
+BEARING_M = (0.115, 0.175, 0.24, 0.3)
+"""Thicknesses of bearing walls: bricks of 115 to 300 mm (DIN 105)."""
+SENSORS = ((12_000, 1.0), (20_000, 0.8), (12_000, 0.7))
+"""Pixels a snapshot keeps and seconds between two: a third to a half of Tango's points. Fewer are
+simulated in minutes. Assumption."""
 
 
 def training_storeys(kind: str) -> tuple[Plan, ...]:
@@ -85,3 +121,63 @@ def _institute(i: int, seed: int) -> StoreyParams:
         )
     ring = RingParams(modules_min=8, modules_max=14, corridor_m=corridor, depth_m=depth)
     return StoreyParams(seed=seed, layout="ring", inner_m=inner, ring=ring, furnishing=BARE)
+
+
+@dataclass(frozen=True)
+class FurnishedStorey:
+    """A storey to learn doors, windows and furniture from, and who scans it."""
+
+    building: str
+    storey: str
+    params: StoreyParams
+    campaign: CampaignParams
+    scans_per_room: float
+
+    def plan(self) -> Plan:
+        """Return what is true of it."""
+        return make_storey(self.params, self.building, self.storey)
+
+
+def furnished_storeys() -> tuple[FurnishedStorey, ...]:
+    """Return small storeys with openings and furniture, no two built and scanned alike."""
+    return tuple(_furnished(i, FURNISHED_SEED + i, layout) for i, layout in enumerate(FURNISHED))
+
+
+def _furnished(i: int, seed: int, layout: Mapping[str, Any]) -> FurnishedStorey:
+    rng = np.random.default_rng((seed, 0))
+    rays, interval_s = SENSORS[i % len(SENSORS)]
+    openings = OpeningParams(
+        doors_m=DOORS_M[int(rng.integers(len(DOORS_M)))],
+        door_head_m=float(rng.choice(HEADS_M)),
+        p_state=STATES[i % len(STATES)],
+        window_m=_drawn(rng, 0.9, 2.0),
+        sill_m=_drawn(rng, 0.3, 1.1),
+        window_head_m=_drawn(rng, 2.0, 2.4),
+    )
+    furnishing = FurnishingParams(
+        workplace_m2=_drawn(rng, 6.0, 11.0),
+        cabinet_m2=_drawn(rng, 5.0, 12.0),
+        clutter_m2=_drawn(rng, 8.0, 16.0),
+        p_pushed_in=_drawn(rng, 0.3, 0.6),
+    )
+    params = StoreyParams(
+        seed=seed,
+        yaw_rad=_drawn(rng, -np.pi / 4, np.pi / 4),
+        ceiling_m=_drawn(rng, 2.5, 3.2),
+        bearing_m=float(rng.choice(BEARING_M)),
+        inner_m=float(rng.choice(INNER_M)),
+        openings=openings,
+        furnishing=furnishing,
+        **layout,
+    )
+    campaign = CampaignParams(
+        seed=seed,
+        volunteers=3,
+        sensor=SensorParams(rays=rays),
+        volunteer=VolunteerParams(interval_s=interval_s),
+    )
+    return FurnishedStorey(f"training{i + 1}", "1", params, campaign, _drawn(rng, 1.0, 1.6))
+
+
+def _drawn(rng: np.random.Generator, least: float, most: float) -> float:
+    return round(float(rng.uniform(least, most)), 3)
