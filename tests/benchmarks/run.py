@@ -18,6 +18,7 @@ from typing import Any
 from catalog import catalog
 from codec import codec
 from planes import planes
+from rays import rays
 from readers import memory, readers
 from report import Report, machine
 from storey import storey
@@ -31,6 +32,7 @@ SECTIONS: dict[str, Callable[[bool], Report]] = {
     "voxels": voxels,
     "codec": codec,
     "viterbi": viterbi,
+    "rays": rays,
     "memory": memory,
     "catalog": catalog,
 }
