@@ -53,7 +53,7 @@ class Place(BaseModel):
     storey: str
     scan: str | None = None
 
-    @field_validator("building", "storey", "scan")
+    @field_validator("run", "building", "storey", "scan")
     @classmethod
     def _is_a_name(cls, value: str | None) -> str | None:
         if value is not None:

@@ -135,6 +135,43 @@ def pack(store: Path, table: str, schema: pa.Schema, settled: Callable[[str], bo
             packing.add({uri: stamps[uri] for uri in new})
 
 
+def drop_stale(store: Path, table: str, *, dry_run: bool = False) -> list[int]:
+    """Remove the packs of a table that hold rows of files that are gone, or that nobody knows.
+
+    Does nothing while another packs.
+
+    Returns
+    -------
+    list of int
+        The bytes of each; with `dry_run` they stay.
+    """
+    folder = _folder(store, table)
+    with _alone(folder) as alone:
+        if not alone:
+            return []
+        stamps = find(store, table)
+        live: dict[str, bool] = {}
+        for uri, stamp, name in _packed_files(folder):
+            live[name] = live.get(name, True) and stamps.get(uri) == stamp
+        dropped = []
+        for path in [*folder.glob("*.parquet"), *folder.glob(".*.tmp")]:
+            if path.name != INDEX_FILE and not live.get(f"{FOLDER}/{table}/{path.name}"):
+                dropped.append(path.stat().st_size)
+                if not dry_run:
+                    path.unlink(missing_ok=True)
+        return dropped
+
+
+def _packed_files(folder: Path) -> list[tuple[str, Stamp, str]]:
+    """Return each file an index names, its stamp and its pack; none of an index that is unsound."""
+    columns = ["uri", "bytes", "mtime_ns", "pack"]
+    try:
+        rows = pq.read_table(folder / INDEX_FILE, columns=columns, partitioning=None).to_pylist()
+    except (OSError, pa.ArrowException, ValueError, KeyError):
+        return []  # it is a cache: made anew
+    return [(row["uri"], (row["bytes"], row["mtime_ns"]), row["pack"]) for row in rows]
+
+
 class _Packing:
     """One pack being made."""
 

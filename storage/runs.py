@@ -1,8 +1,6 @@
 """The runs of storeys: what was asked, when, and how it ended; enough to run it again."""
 
-import fcntl
 import json
-import os
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,8 +13,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from storage.artifacts import Place, column, replace_table, schema
+from storage.artifacts import Place, check_name, column, replace_table, schema
 from storage.errors import StoreError
+from storage.locks import FOLDER, held, is_held
 from storage.stages import reason
 
 RUNNING, COMPLETED, PARTIAL, FAILED = "running", "completed", "partial", "failed"
@@ -119,38 +118,26 @@ def recorded(store: str, run: Run) -> Iterator[Recorder]:
     """Record a run at its start and at its end; one that raises is recorded as failed.
 
     While it goes on, the run holds a lock that its death drops: so others can tell a run that
-    goes on from one that was killed.
+    goes on from one that was killed. And it shares the lock of its storey: so nothing is pruned
+    there meanwhile.
     """
-    held = _hold(_lock(store, run.id))
-    recorder = Recorder(run)
-    try:
-        _write(store, run)
-        yield recorder
-    except BaseException as error:
-        recorder.end(FAILED, reason(error))
-        raise
-    finally:
-        ended = replace(recorder.run, ended_at=datetime.now(UTC))
-        _write(store, ended)
-        os.close(held)
-        _lock(store, run.id).unlink(missing_ok=True)
+    lock = _lock(store, run.id)
+    with held(storey_lock(store, run.building, run.storey), shared=True), held(lock):
+        recorder = Recorder(run)
+        try:
+            _write(store, run)
+            yield recorder
+        except BaseException as error:
+            recorder.end(FAILED, reason(error))
+            raise
+        finally:
+            _write(store, replace(recorder.run, ended_at=datetime.now(UTC)))
+            lock.unlink(missing_ok=True)
 
 
 def goes_on(store: str, run: Run) -> bool:
     """Return whether the process of a run is still at it."""
-    if run.state != RUNNING:
-        return False
-    try:
-        descriptor = os.open(_lock(store, run.id), os.O_RDWR)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
+    return run.state == RUNNING and is_held(_lock(store, run.id))
 
 
 def read_runs(
@@ -190,18 +177,11 @@ def _write(store: str, run: Run) -> None:
     replace_table(path, pa.Table.from_pylist([row], SCHEMA))
 
 
+def storey_lock(store: Path | str, building: str, storey: str) -> Path:
+    """Return the lock file of a storey: shared by runs that go on, alone for who prunes."""
+    name = sha256(f"{building}/{storey}".encode()).hexdigest()[:32]
+    return Path(store) / FOLDER / f"storey-{name}.lock"
+
+
 def _lock(store: str, run: str) -> Path:
-    return Path(store) / ".locks" / f"run-{run}.lock"
-
-
-def _hold(path: Path) -> int:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        raise StoreError(
-            f"{path.parent}: cannot write there ({error.strerror}); make the store writable, or "
-            "choose another with --store"
-        ) from error
-    fcntl.flock(descriptor, fcntl.LOCK_EX)
-    return descriptor
+    return Path(store) / FOLDER / f"run-{check_name(run)}.lock"

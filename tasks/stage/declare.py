@@ -8,6 +8,7 @@ What the function needs to know of all this: nothing.
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -16,9 +17,12 @@ from prefect.client.schemas.objects import State, TaskRun
 from prefect.context import TaskRunContext
 from prefect.futures import PrefectFuture
 
-from storage.artifacts import Place, Ref, check_name, write
+from storage.artifacts import Place, Ref, check_name
 from tasks.stage import ledger, records
-from tasks.stage.meter import metered
+from tasks.stage.apart import compute_apart
+from tasks.stage.compute import compute
+from tasks.stage.limits import limits
+from tasks.stage.meter import Cost, metered
 from tasks.stage.policy import policy_for
 from tasks.stage.signature import signature_of
 
@@ -90,21 +94,21 @@ class Stage:
             with metered() as cost:
                 if asked.error is not None:
                     raise asked.error
-                refs = self._compute(inputs)
+                refs, apart = self._compute(inputs)
         except BaseException as error:
             ledger.failed(task_run, asked, cost, error)
             raise
+        if apart is not None:
+            cost = replace(apart, wall_s=cost.wall_s)
         # before Prefect commits the cache record: a kill in between loses no row
         ledger.computed(task_run, asked, cost, refs)
         return refs if self.signature.several else refs[0]
 
-    def _compute(self, inputs: dict[str, Any]) -> list[Ref]:
-        place: Place = inputs["place"]
-        values = {a.name: a.value(inputs[a.name], place.store) for a in self.signature.arguments}
-        result = self.fn(**values)
-        results = result if self.signature.several else (result,)
-        kinds = self.signature.results
-        return [write(kind, value, place) for kind, value in zip(kinds, results, strict=True)]
+    def _compute(self, inputs: dict[str, Any]) -> tuple[list[Ref], Cost | None]:
+        """Return what is made, and what it cost if another process made it."""
+        if not (allowed := limits()):
+            return compute(self.fn, self.signature, inputs), None
+        return compute_apart(self.fn, self.name, inputs, allowed)
 
 
 def stage(fn: Callable[..., Any], name: str) -> Stage:

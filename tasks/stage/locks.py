@@ -4,7 +4,6 @@ Prefect's own file lock leaves its file behind after a kill, so that the next ru
 waits for ever, and fails on keys with a "/".
 """
 
-import fcntl
 import hashlib
 import os
 import threading
@@ -16,11 +15,13 @@ from typing import Any
 import anyio
 from prefect.locking.protocol import LockManager
 
+from storage.locks import take
+
 POLL_S = 0.05
 
 
 class FlockLockManager(LockManager):
-    """Locks keys by files in a folder; the files stay, empty, one per key ever asked for.
+    """Locks keys by files in a folder; the files stay, empty, until they are pruned.
 
     Parameters
     ----------
@@ -105,15 +106,8 @@ class FlockLockManager(LockManager):
         return True
 
     def _try(self, key: str) -> int | None:
-        self._folder.mkdir(parents=True, exist_ok=True)
         name = hashlib.sha256(key.encode()).hexdigest()[:32] + ".lock"
-        descriptor = os.open(self._folder / name, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            return None
-        return descriptor
+        return take(self._folder / name)
 
 
 def _poll(ready: Callable[[], bool], timeout: float | None) -> bool:

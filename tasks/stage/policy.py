@@ -13,6 +13,7 @@ from prefect.transactions import IsolationLevel
 
 from storage.artifacts import Place
 from storage.fingerprint import code_fingerprint
+from storage.locks import FOLDER
 from tasks.stage import ledger, records
 from tasks.stage.locks import FlockLockManager
 from tasks.stage.signature import StageSignature
@@ -64,7 +65,7 @@ def policy_for(store: str, stage: str, fn: Any, signature: StageSignature) -> St
     return StagePolicy(
         isolation_level=IsolationLevel.SERIALIZABLE,
         lock_manager=FlockLockManager(
-            Path(store) / ".locks", partial(records.drop_unless_sound, store)
+            Path(store) / FOLDER, partial(records.drop_unless_sound, store)
         ),
         stage=stage,
         fn=fn,
