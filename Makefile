@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test bench lint format constraints clean
+.PHONY: help environment demo test bench ops lint format constraints clean
 
 help: ## what there is to make
 	@sed -n 's/^\([a-z]*\):.*## /\1|/p' $(MAKEFILE_LIST) | while IFS='|' read -r target purpose; do \
@@ -25,6 +25,9 @@ test: lint ## every check and every test
 
 bench: $(ENVIRONMENT) ## measure speed and accuracy
 	$(BIN)/python $(BENCHMARKS)
+
+ops: $(ENVIRONMENT) ## scheduled deployments on a Prefect server and worker, end to end
+	$(BIN)/python tests/deployments/end_to_end.py
 
 lint: $(ENVIRONMENT) ## style, types and the direction of imports
 	$(BIN)/ruff check .

@@ -11,9 +11,13 @@ from typing import IO, Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from flows.failures import Failure, failures_of
 from flows.settings import load_settings
 from storage.errors import MapSenseError, StoreError
 from storage.runs import Run, goes_on, last_runs, read_runs
+
+SHOWN = 5
+"""Failures of a run that a table names."""
 
 
 def ask(what: str | None, store: Path | None, form: str, out: Path | None) -> int:
@@ -30,7 +34,7 @@ def ask(what: str | None, store: Path | None, form: str, out: Path | None) -> in
             )
         )
         return 0
-    catalog = Catalog(_existing(store))
+    catalog = Catalog(existing_store(store))
     answer = catalog.query(what)
     for problem in catalog.problems:
         print(f"mapsense: {problem}", file=sys.stderr)
@@ -54,15 +58,18 @@ def make_report(store: Path | None, out: Path, building: str | None) -> int:
     """Write the figures and the page of a store."""
     from flows.report.page import write_report
 
-    print(write_report(_existing(store), out, building))
+    print(write_report(existing_store(store), out, building))
     return 0
 
 
 def show_status(building: str | None, storey: str | None, store: Path | None, as_json: bool) -> int:
-    """Show the last run of each storey."""
-    root = _existing(store)
+    """Show the last run of each storey, and what failed in it."""
+    root = existing_store(store)
     last = last_runs(read_runs(root, building, storey))
     rows = [_status(str(root), run) for run in last]
+    for row, run in zip(rows, last, strict=True):
+        failed = failures_of(str(root), run)
+        row["failed"] = [f.as_json() for f in failed] if as_json else _listed(failed)
     if as_json:
         print(json.dumps(rows, indent=1, default=str))
     elif rows:
@@ -87,6 +94,13 @@ def _status(store: str, run: Run) -> dict[str, Any]:
         "message": run.message,
         "run": run.id,
     }
+
+
+def _listed(failed: list[Failure]) -> str:
+    """Return failures for a table: the first few, for a message tells the reasons."""
+    names = [str(failure) for failure in failed[:SHOWN]]
+    more = len(failed) - len(names)
+    return ", ".join(names + ([f"{more} more"] if more else []))
 
 
 def state_now(store: str, run: Run) -> str:
@@ -155,7 +169,8 @@ def _plain(value: Any) -> str:
     return value.hex() if isinstance(value, bytes) else str(value)
 
 
-def _existing(store: Path | None) -> Path:
+def existing_store(store: Path | None) -> Path:
+    """Return the folder of a store that is there, else raise StoreError."""
     root = load_settings(store=store).store
     if not root.is_dir():
         raise StoreError(f"{root}: there is no store; name one with --store, or map a storey first")

@@ -5,7 +5,9 @@ from typing import Any
 from prefect import flow
 from prefect.states import Failed
 
+from flows.hooks import publish, tell
 from flows.request import StoreyRequest
+from flows.server import is_own
 from flows.storey import map_storey, threads
 
 
@@ -28,5 +30,9 @@ def map_building(building: str, storeys: list[StoreyRequest], jobs: int | None =
 
 
 def with_jobs(jobs: int) -> Any:
-    """Return the storey's flow with its own number of stages at once."""
-    return map_storey.with_options(task_runner=threads(jobs))
+    """Return the storey's flow with its own number of stages at once.
+
+    How a run ended is shown on the pages of Prefect's server, unless nobody ever sees these.
+    """
+    hooks: list[Any] = [tell] if is_own() else [tell, publish]
+    return map_storey.with_options(task_runner=threads(jobs), on_completion=hooks, on_failure=hooks)

@@ -245,6 +245,69 @@ def evaluate(
     return score(what, truth, truth_storey, building, storey, seeds, store, set_ or [], jobs, json)
 
 
+@app.command
+def train(
+    kind: Annotated[Literal["doors", "furniture"], Parameter(help="What is to be told apart.")],
+    /,
+    *,
+    out: Annotated[
+        Path | None, Parameter(help="File of the forest. [default: the one that is used]")
+    ] = None,
+    work: Annotated[
+        Path, Parameter(help="Folder of the simulated scans and what is made of them.")
+    ] = Path("mapsense-training"),
+    set_: Set = None,
+    jobs: Jobs = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Train a classifier on storeys simulated for it; scores are of storeys held back in turn.
+
+    What an earlier training simulated and mapped is taken from the work folder.
+
+    For example
+
+    ```
+    mapsense train doors --work training --out forest.parquet
+    ```
+    """
+    from flows.verbs import train_classifier
+
+    return train_classifier(kind, out, work, set_ or [], jobs, json)
+
+
+@app.command
+def wall(
+    wall: Annotated[
+        str | None, Parameter(help="Id of the wall in the plan, as w12. [default: most doors]")
+    ] = None,
+    /,
+    *,
+    building: Annotated[str, Parameter(help="Name of the building.")],
+    storey: Annotated[str, Parameter(help="Name of the storey.")],
+    out: Annotated[Path, Parameter(help="File of the picture, .png or .svg.")],
+    room: Annotated[
+        str | None, Parameter(help="Room that looks at it, as r3. [default: its first]")
+    ] = None,
+    store: Store = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Draw how the doors of a wall were found: what rays saw, edges, lines, rectangles, doors.
+
+    For example
+
+    ```
+    mapsense wall w12 --building library --storey 2 --out w12.png
+    ```
+    """
+    from flows.panels import draw_wall
+
+    return draw_wall(building, storey, wall, room, out, store, json)
+
+
 grammar_app = App(name="grammar", help="Indoor grammars: learn, show and check them.")
 app.command(grammar_app)
 
@@ -418,6 +481,8 @@ def rerun(
     *,
     building: Annotated[str | None, Parameter(help="Only this building.")] = None,
     storey: Annotated[str | None, Parameter(help="Only this storey.")] = None,
+    scan: Annotated[str | None, Parameter(help="Only storeys where this scan failed.")] = None,
+    stage: Annotated[str | None, Parameter(help="Only storeys where this stage failed.")] = None,
     store: Store = None,
     jobs: Jobs = None,
     json: Json = False,
@@ -432,11 +497,78 @@ def rerun(
 
     ```
     mapsense rerun --building library
+    mapsense rerun --stage rooms
     ```
     """
     from flows.verbs import run_again
 
-    return run_again(building, storey, store, jobs, json)
+    return run_again(building, storey, scan, stage, store, jobs, json)
+
+
+@app.command
+def prune(
+    *,
+    building: Annotated[str | None, Parameter(help="Only this building.")] = None,
+    keep_runs: Annotated[
+        int, Parameter(help="Successful runs kept of each storey, verb, variant and seed.")
+    ] = 1,
+    older_than: Annotated[
+        float | None,
+        Parameter(allow_leading_hyphen=True, help="Keep all runs of so many last days."),
+    ] = None,
+    dry_run: Annotated[bool, Parameter(negative=(), help="Remove nothing, say what.")] = False,
+    store: Store = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Remove what no current result needs: artifacts, cache records, rows and records of runs.
+
+    What the last successful run of each storey made or reused stays, and what later ones computed
+    before they failed. A storey where a run goes on is left as it is. Plans stay, wherever they
+    are. `query regressions` compares two runs: keep as many. Small files of measurements need no
+    merging: queries read them from packs, and packs with rows that are gone are removed too.
+
+    For example
+
+    ```
+    mapsense prune --older-than 30 --dry-run
+    ```
+    """
+    from flows.pruning import prune_store
+
+    return prune_store(store, building, keep_runs, older_than, dry_run, json)
+
+
+@app.command
+def deploy(
+    *files: Annotated[
+        Path, Parameter(help="Files of buildings, or folders of such. [default: deployments]")
+    ],
+    work_pool: Annotated[
+        str | None, Parameter(help="Work pool of the runs. [default: that of prefect.yaml]")
+    ] = None,
+    prefect_file: Annotated[
+        Path | None, Parameter(help="What all share. [default: prefect.yaml beside the files]")
+    ] = None,
+    check: Annotated[bool, Parameter(negative=(), help="Only read the files.")] = False,
+    store: Store = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> int:
+    """Register buildings with a Prefect server: mapped by the clock as new scans arrive.
+
+    For example
+
+    ```
+    mapsense deploy deployments
+    mapsense deploy deployments/north.toml --work-pool buildings
+    ```
+    """
+    from flows.deployments import deploy as register
+
+    return register(files, work_pool, prefect_file, store, check, json)
 
 
 def main(arguments: list[str] | None = None) -> None:

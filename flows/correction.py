@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from prefect.futures import PrefectFuture
-
 from flows import stages
+from flows.ended import made_by
 from flows.params import MapSenseParams
 from flows.plans import grammar_source
 from flows.results import Corrected
 from storage.artifacts import Place, Ref
-from storage.stages import reason
 
 
 def correct(
@@ -31,16 +29,8 @@ def correct(
     layout = stages.layout.submit(place, seen, grammar, params.decode)
     final = stages.layout_rooms.submit(place, rooms, rooms, seen, layout, grammar, params.place)
     walls = stages.layout_walls.submit(place, final, faces, params.intersect)
-    made: list[Ref] = []
-    for future in (seen, layout, final, walls):
-        future.wait()
-        if not future.state.is_completed():
-            name = Path(grammar.path).stem
-            return Corrected(grammar.path, (), f"grammar {name} not applied: {_why(future)}")
-        made.append(future.result())
+    made, why = made_by((seen, layout, final, walls))
+    if why:
+        problem = f"grammar {Path(grammar.path).stem} not applied: {why}"
+        return Corrected(grammar.path, (), problem)
     return Corrected(grammar.path, tuple(made))
-
-
-def _why(future: PrefectFuture[Any]) -> str:
-    error = future.state.result(raise_on_failure=False)
-    return reason(error) if isinstance(error, BaseException) else str(future.state.message)

@@ -5,8 +5,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from flows.campaign import Site, record_scans
+from storage.detections import IOU
 from storage.plan import Plan, PlanRoom
 from storage.plan_geojson import write_plan
+from tasks.evaluation.detections import EvaluationParams, detect
 from tasks.evaluation.rooms import ious, match
 from tasks.simulation.campaign import CampaignParams
 from tasks.simulation.mesh import storey_mesh
@@ -17,6 +19,10 @@ from tasks.simulation.volunteers import VolunteerParams
 BUILDING, STOREY = "demo", "0"
 AGAIN = 3
 """Rooms of the demo that a second volunteer scans too."""
+
+
+COMPARED = ("door", "window", "table", "chair")
+"""The objects of the demo that are compared."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,21 @@ def compare_rooms(truth: Plan, mapped: Plan) -> list[RoomMatch]:
         _missed(room) if j < 0 else _match(room, mapped.rooms[j], float(overlap[j, i]))
         for i, (room, j) in enumerate(zip(truth.rooms, match(overlap), strict=True))
     ]
+
+
+def compare_objects(truth: Plan, mapped: Plan) -> list[dict[str, str | int]]:
+    """Return how many doors, windows, tables and chairs there are, were found, and are both.
+
+    Doors and windows by an IoU over 0.5 on the wall, furniture by one over 0.25 of the footprints.
+    """
+    found = detect(mapped, truth, EvaluationParams(opening_iou=(0.5,), footprint_iou=(0.25,)))
+    counts: list[dict[str, str | int]] = []
+    for class_ in COMPARED:
+        asked = (found.classes == class_) & (found.metrics == IOU)
+        true, ours = found.true_ids[asked] != "", found.found_ids[asked] != ""
+        numbers = {"true": int(true.sum()), "found": int(ours.sum())}
+        counts.append({"object": class_, **numbers, "matched": int((true & ours).sum())})
+    return counts
 
 
 def _match(room: PlanRoom, found: PlanRoom, iou: float) -> RoomMatch:

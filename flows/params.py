@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError, model_validator
 
+from flows.forests import KINDS, Kind
 from storage.errors import MapSenseError
 from tasks.device.codec import CodecParams
 from tasks.device.costs import EnergyParams
@@ -14,11 +15,16 @@ from tasks.device.sweep import SweepParams
 from tasks.device.targets import TargetParams
 from tasks.device.voxels import VoxelParams
 from tasks.device.work import WorkParams
+from tasks.doors.candidates import CandidateParams
+from tasks.doors.openings import OpeningsParams
+from tasks.doors.trace import TraceParams
 from tasks.evaluation.detections import EvaluationParams
 from tasks.evaluation.disturbance import DisturbParams
 from tasks.evaluation.planes import PlaneQualityParams
 from tasks.evaluation.points import PointQualityParams
 from tasks.evaluation.walls import WallQualityParams
+from tasks.furniture.classification import FurnitureParams
+from tasks.furniture.segments import FurnitureSegmentParams
 from tasks.layout.decoding.decode import DecodeParams
 from tasks.layout.extraction.observations import ExtractParams
 from tasks.layout.placement.params import PlacementParams
@@ -61,6 +67,19 @@ class MapSenseParams(Params):
     """The most probable rooms along each line (Eq. 9-11)."""
     place: PlacementParams = PlacementParams()
     """What of them becomes the final plan."""
+    detect: tuple[Kind, ...] = KINDS
+    """What is looked for in the final plan besides rooms and walls: doors (and windows),
+    furniture."""
+    trace: TraceParams = TraceParams()
+    """Label and depth images of walls (Fig. 9)."""
+    candidates: CandidateParams = CandidateParams()
+    """Rectangles in them that may be doors or windows (Sec. 5)."""
+    openings: OpeningsParams = OpeningsParams()
+    """Which of them are."""
+    furniture_segments: FurnitureSegmentParams = FurnitureSegmentParams()
+    """Level surfaces that may be furniture (Sec. 6)."""
+    furniture: FurnitureParams = FurnitureParams()
+    """Which of them are."""
     disturb: DisturbParams = DisturbParams()
     """For experiments: walls of the initial model that go missing, and false ones."""
     work: WorkParams = WorkParams()

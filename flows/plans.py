@@ -8,7 +8,7 @@ from typing import NamedTuple
 from grammars.library import find_grammar
 from grammars.reading import read_grammar
 from storage.plan_geojson import to_geojson, write_plan
-from storage.sources import Source
+from storage.sources import Source, file_source
 from tasks.evaluation.label_files import is_labels
 from tasks.evaluation.truth import read_truth, truth_files
 
@@ -17,10 +17,7 @@ GEOJSON = ".geojson"
 
 def plan_source(path: Path) -> Source:
     """Return a plan's file as a stage's input: named, and known by the hash of its bytes."""
-    data = path.read_bytes()
-    return Source(
-        name="plan", path=str(path), sha256=sha256(data).hexdigest(), size_bytes=len(data)
-    )
+    return file_source(path, "plan")
 
 
 def grammar_source(name: str) -> Source:
@@ -33,7 +30,7 @@ def grammar_source(name: str) -> Source:
     """
     path = find_grammar(name)
     read_grammar(path)  # what is wrong in it is said before anything runs
-    return plan_source(path).model_copy(update={"name": "grammar"})
+    return file_source(path, "grammar")
 
 
 class Truth(NamedTuple):

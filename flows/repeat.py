@@ -14,7 +14,7 @@ from flows.outcomes import Outcome, RoomScores, kept_in, room_scores, title
 from flows.params import MapSenseParams
 from flows.plans import Truth, plan_source
 from flows.request import OfStorey, StoreyRequest
-from flows.results import FINAL, INITIAL, Skipped, state_of, write_plans
+from flows.results import FINAL, INITIAL, Skipped, is_corrected, state_of, write_plans
 from flows.storey import ending, map_scans
 from storage.artifacts import check_name, read
 from storage.detections import DETECTIONS
@@ -97,10 +97,11 @@ def repeat(request: RepeatRequest, inputs: Inputs) -> list[Outcome]:
     What goes wrong is recorded and returned, never raised: it stops no other repeat.
     """
     name = title(request.building, request.storey, request.variant, request.seed)
+    folder = request.folder()
     progress.expect(request.place(), _stages(inputs, request.params), name)
     with tags(request.variant, f"seed {request.seed}"):
         outcomes = [_recorded(request, partial(_map_and_score, request, inputs))]
-        if outcomes[0].rooms is not None and _is_refined(request.folder()):
+        if outcomes[0].rooms is not None and is_corrected(folder / INITIAL, folder / FINAL):
             first = request.of_initial()
             outcomes.append(_recorded(first, partial(_score_initial, request, first, inputs.truth)))
     progress.ended(request.place(), request.experiment)
@@ -155,10 +156,6 @@ def _recorded(request: RepeatRequest, score: Callable[[Recorder], RoomScores]) -
 
 
 def _stages(inputs: Inputs, params: MapSenseParams) -> int:
-    scans, has_grammar = len(inputs.sources), params.grammar is not None
+    scans = len(inputs.sources)
     of_truth = stages.PER_PLAN + scans * stages.PER_TRUE_SCAN + (inputs.truth.labels is not None)
-    return stages.of_mapping(scans, has_grammar) + of_truth
-
-
-def _is_refined(folder: Path) -> bool:
-    return (folder / INITIAL).read_bytes() != (folder / FINAL).read_bytes()
+    return stages.of_mapping(scans, params) + of_truth

@@ -2,7 +2,7 @@
 
 import json
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from storage import coverage as stored_coverage
 from storage.artifacts import Ref
 from storage.files import write_whole
 from storage.plan import Plan
-from storage.plan_geojson import write_plan
+from storage.plan_geojson import read_plan, to_geojson, write_plan
 from storage.quality import Quality
 from storage.runs import COMPLETED, FAILED, PARTIAL
 from storage.scans import Scan
@@ -61,6 +61,8 @@ class Mapped:
     plan: Plan
     """the final one: the initial one, corrected by the grammar if there is one"""
     corrected: Corrected
+    unfound: tuple[str, ...]
+    """why doors and windows, or furniture, could not be looked for"""
     coverage: stored_coverage.Coverage
     scans: tuple[Scan, ...]
     quality: tuple[Quality, ...]
@@ -70,6 +72,12 @@ class Mapped:
     rows: dict[str, int]
     """rows of each table, over all scans"""
     used: tuple[UsedScan, ...]
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Return what could not be done with the scans that were used."""
+        grammar = (self.corrected.problem,) if self.corrected.problem else ()
+        return (*grammar, *self.unfound)
 
 
 def write_results(request: StoreyRequest, mapped: Mapped) -> None:
@@ -85,6 +93,14 @@ def write_plans(mapped: Mapped, folder: Path) -> None:
     """Write the initial and the final model, each whole or not at all."""
     write_plan(mapped.initial, folder / INITIAL)
     write_plan(mapped.plan, folder / FINAL)
+
+
+def is_corrected(initial: Path, final: Path) -> bool:
+    """Return whether a final model has other rooms or walls than the initial one it came from."""
+    models = (read_plan(path) for path in (initial, final))
+    bare = (replace(model, doors=(), windows=(), furniture=()) for model in models)
+    first, last = (to_geojson(model) for model in bare)
+    return first != last
 
 
 def summarise(
@@ -126,7 +142,7 @@ def state_of(mapped: Mapped | None, skipped: list[Skipped]) -> str:
     """Return how a run ended."""
     if mapped is None:
         return FAILED
-    return PARTIAL if skipped or mapped.corrected.problem else COMPLETED
+    return PARTIAL if skipped or mapped.problems else COMPLETED
 
 
 def write_summary(request: StoreyRequest, summary: dict[str, Any]) -> None:
@@ -169,6 +185,9 @@ def _found(mapped: Mapped) -> dict[str, Any]:
     return {
         "rooms": len(rooms),
         "walls": len(mapped.plan.walls),
+        "doors": len(mapped.plan.doors),
+        "windows": len(mapped.plan.windows),
+        "furniture": len(mapped.plan.furniture),
         "area_m2": round(sum(room.polygon.area for room in rooms), 2),
         "floor_m": mapped.coverage.floor_level_m,
         "ceiling_m": mapped.coverage.ceiling_level_m,

@@ -35,12 +35,16 @@ SETTINGS = {
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_READ_BATCH_SIZE": "200",
     "PREFECT_SERVER_API_BLOCKS_REGISTER_ON_START": "false",
     "PREFECT_UI_ENABLED": "0",
+    # 2 + 4 + 8 s: a server that is gone for longer does not come back by waiting a minute a call
+    "PREFECT_CLIENT_MAX_RETRIES": "3",
     # stages run in threads of their own: BLAS threads below them cost five times
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
 }
 """Set before Prefect or numpy is imported; what the person has set wins."""
+_own: set[str] = set()
+"""addresses this process serves"""
 
 
 def quiet(verbose: bool) -> None:
@@ -51,6 +55,7 @@ def quiet(verbose: bool) -> None:
         # errors reach the person as one sentence, from us
         os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
         os.environ.setdefault("PREFECT_LOGGING_SERVER_LEVEL", "CRITICAL")
+        os.environ.setdefault("PREFECT_LOGGING_INTERNAL_LEVEL", "CRITICAL")
         os.environ.setdefault("PREFECT_LOGGING_TO_API_ENABLED", "false")
 
 
@@ -66,13 +71,20 @@ def prefect_api(store: Path) -> Iterator[None]:
         shutil.copyfile(empty_database(home), database)
         port = _free_port()
         server = _start(port, database)
-        os.environ["PREFECT_API_URL"] = f"http://127.0.0.1:{port}/api"
+        url = os.environ["PREFECT_API_URL"] = f"http://127.0.0.1:{port}/api"
+        _own.add(url)
         try:
             yield
         finally:
+            _own.discard(url)
             del os.environ["PREFECT_API_URL"]
             server.terminate()
             server.wait()
+
+
+def is_own() -> bool:
+    """Return whether Prefect's API is one that this process serves: it is gone with it."""
+    return os.environ.get("PREFECT_API_URL") in _own
 
 
 def wait_until_up() -> None:

@@ -13,9 +13,9 @@ import os
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import Field, PositiveInt, ValidationError
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -28,6 +28,8 @@ from storage.errors import MapSenseError
 
 FILE = "mapsense.toml"
 PREFIX = "MAPSENSE_"
+OF_PROCESSES = ("stage_timeout_s", "stage_memory_mb")
+"""Settings that stages take from the environment of the process they run in."""
 
 
 def default_jobs() -> int:
@@ -51,6 +53,12 @@ class Settings(BaseSettings):
     """Folder of everything that is kept."""
     jobs: PositiveInt = Field(default_factory=default_jobs)
     """Stages that run at once."""
+    stage_timeout_s: PositiveFloat | None = None
+    """Seconds after which a stage is stopped, its scan skipped. Not set: never."""
+    stage_memory_mb: PositiveInt | None = None
+    """Memory a stage may take before it fails, its scan skipped. Not set: all there is."""
+    log: Literal["none", "text", "json"] = "none"
+    """Whether each event of a run is written on stderr, and as what: for runs nobody watches."""
     params: dict[str, Any] = {}
     """Parameters of the stages, by stage: what flags and defaults leave open."""
 
@@ -78,7 +86,7 @@ def load_settings(**flags: Any) -> Settings:
     _check_environment()
     given = {name: value for name, value in flags.items() if value is not None}
     try:
-        return Settings(**given)
+        settings = Settings(**given)
     except tomllib.TOMLDecodeError as error:
         raise MapSenseError(f"{Path(FILE).resolve()}: is no TOML ({error})") from error
     except OSError as error:
@@ -93,6 +101,10 @@ def load_settings(**flags: Any) -> Settings:
         raise MapSenseError(
             f"setting '{name}' = {first['input']!r}: {first['msg'].lower()}"
         ) from error
+    for name in OF_PROCESSES:
+        if (value := getattr(settings, name)) is not None:
+            os.environ[f"{PREFIX}{name.upper()}"] = str(value)
+    return settings
 
 
 def _check_environment() -> None:

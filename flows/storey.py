@@ -14,7 +14,9 @@ from prefect.task_runners import ThreadPoolTaskRunner
 from flows import progress, stages
 from flows.correction import correct
 from flows.disturbance import disturbed
-from flows.model import Made, final_plan, initial_plan
+from flows.ended import why_ended
+from flows.model import Made, final_plan, initial_plan, with_furniture, with_openings
+from flows.objects import Objects, find_objects
 from flows.request import StoreyRequest
 from flows.results import (
     Corrected,
@@ -29,12 +31,15 @@ from flows.settings import default_jobs
 from storage.artifacts import Ref, read
 from storage.coverage import COVERAGE
 from storage.errors import StoreError
+from storage.furniture import FURNITURE
 from storage.layout_rooms import LAYOUT_ROOMS
 from storage.layout_walls import LAYOUT_WALLS
+from storage.openings import OPENINGS
 from storage.quality import QUALITY
 from storage.rooms import ROOMS
 from storage.runs import FAILED, recorded
 from storage.scans import SCANS
+from storage.snapshots import SNAPSHOTS
 from storage.sources import Source
 from storage.stages import forget, reason
 from storage.walls import WALLS
@@ -73,9 +78,7 @@ def _run(request: StoreyRequest, started_at: datetime) -> dict[str, Any]:
     skipped = [Skipped(error.path, reason(error)) for error in errors]
     mapped = None
     if sources:
-        progress.expect(
-            request.place(), stages.of_mapping(len(sources), request.params.grammar is not None)
-        )
+        progress.expect(request.place(), stages.of_mapping(len(sources), request.params))
         mapped = map_scans(request, sources, skipped)
     if mapped is not None:
         write_results(request, mapped)
@@ -131,13 +134,17 @@ def map_scans(
     faces, rooms = disturbed(place, params, faces, rooms)
     # the grammar corrects it: observations along reference lines, an HMM's rooms (Sec. 4.2)
     corrected = correct(place, params, faces, rooms, segmented)
+    # what stands in its walls and rooms: doors and windows (Sec. 5), furniture (Sec. 6)
+    decoded = [points[n].result() for n in used]
+    eyes = [ref for n in used for ref in sent[n].result() if ref.table == SNAPSHOTS.table]
+    objects = find_objects(place, params, corrected.made or rooms, decoded, eyes)
 
-    made: list[Ref] = [*faces, *rooms, *space, *corrected.made]
+    made: list[Ref] = [*faces, *rooms, *space, *corrected.made, *objects.made]
     for n in used:
         made += [*sent[n].result(), quality[n].result(), streams[n].result()]
         made += [*planes[n].result(), segments[n].result()]
     scans = tuple(UsedScan(n, points[n].result(), segments[n].result()) for n in used)
-    return _mapped(request, scans, made, corrected, skipped, rejected)
+    return _mapped(request, scans, made, corrected, objects, skipped, rejected)
 
 
 def _rejected(request: StoreyRequest, rated: dict[str, Ref]) -> dict[str, str]:
@@ -156,9 +163,7 @@ def _is_used(name: str, futures: Iterable[PrefectFuture[Any]], skipped: list[Ski
     for future in futures:
         future.wait()
         if not future.state.is_completed():
-            error = future.state.result(raise_on_failure=False)
-            why = reason(error) if isinstance(error, BaseException) else future.state.message
-            skipped.append(Skipped(name, why or future.state.name or "unknown"))
+            skipped.append(Skipped(name, why_ended(future)))
             return False
     return True
 
@@ -168,6 +173,7 @@ def _mapped(
     used: tuple[UsedScan, ...],
     made: list[Ref],
     corrected: Corrected,
+    objects: Objects,
     skipped: list[Skipped],
     rejected: dict[str, str],
 ) -> Mapped:
@@ -189,10 +195,16 @@ def _mapped(
         final = final_plan(
             read(LAYOUT_ROOMS, placed, store), read(LAYOUT_WALLS, around, store), about
         )
+    for ref in objects.made:
+        if ref.table == OPENINGS.table:
+            final = with_openings(final, read(OPENINGS, ref, store))
+        elif ref.table == FURNITURE.table:
+            final = with_furniture(final, read(FURNITURE, ref, store))
     return Mapped(
         initial,
         final,
         corrected,
+        objects.problems,
         read(COVERAGE, refs["coverage"][0], store),
         scans,
         tuple(read(QUALITY, ref, store) for ref in refs["quality"]),
@@ -204,7 +216,7 @@ def _mapped(
 
 def ending(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
     """Return what a person should know of how the run ended."""
-    ends = (_ending(asked, skipped, mapped), mapped.corrected.problem if mapped else "")
+    ends = (_ending(asked, skipped, mapped), *(mapped.problems if mapped else ()))
     return "; ".join(end for end in ends if end)
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 from flows.answers import print_answers, print_table, state_now
 from flows.assignments import assigned, merged
+from flows.failures import with_failures
+from flows.forests import Kind, shipped
 from flows.server import prefect_api
 from flows.settings import Settings, load_settings
 from storage.artifacts import check_name
@@ -76,7 +78,9 @@ def run_demo(out: Path, store: Path | None, seed: int, jobs: int | None, as_json
             verb="demo",
         )
         summary = run_storey(request, settings.jobs, not as_json)
-        matches = demo.compare_rooms(truth, read_plan(out / "plan.geojson"))
+        mapped = read_plan(out / "plan.geojson")
+        matches = demo.compare_rooms(truth, mapped)
+        summary["objects"] = demo.compare_objects(truth, mapped)
     summary["rooms"] = [match.as_json() for match in matches]
     _print_summary(summary, as_json)
     if not as_json:
@@ -84,6 +88,8 @@ def run_demo(out: Path, store: Path | None, seed: int, jobs: int | None, as_json
 
         print("\nrooms of the simulated storey, and what was mapped of them (simulated scans):")
         print_table(pa.Table.from_pylist(summary["rooms"]))
+        print("\nwhat stands in them, and what of it was found:")
+        print_table(pa.Table.from_pylist(summary["objects"]))
     return 0 if is_done(summary) else 1
 
 
@@ -178,16 +184,70 @@ def charge_campaign(
     return 1 if missing else 0
 
 
-def run_again(
-    building: str | None, storey: str | None, store: Path | None, jobs: int | None, as_json: bool
+def train_classifier(
+    kind: Kind,
+    out: Path | None,
+    work: Path,
+    assignments: list[str],
+    jobs: int | None,
+    as_json: bool,
 ) -> int:
-    """Run again the storeys whose last run did not do all it was asked for."""
+    """Train a classifier on simulated storeys, into a file."""
+    settings = load_settings(jobs=jobs, params=assigned(assignments) or None)
+    root = writable(work, "folder of the work", "--work")
+    file = (out or shipped(kind)).resolve()
+    writable(file.parent, "folder of the forest", "--out")
+    with prefect_api(root):
+        from flows.params import parse_params
+        from flows.training import TrainRequest
+        from flows.work import run_training
+
+        request = TrainRequest(
+            kind=kind,
+            work=str(root),
+            out=str(file),
+            params=parse_params(settings.params),
+            jobs=settings.jobs,
+        )
+        summary = run_training(request, not as_json)
+    if as_json:
+        print(json.dumps(summary, indent=1, ensure_ascii=False))
+        return 0
+    import pyarrow as pa
+
+    examples = sum(summary["examples"].values())
+    print(
+        f"{summary['out']}: {_count(summary['trees'], 'tree')} of {examples:,} examples from "
+        f"{_count(summary['storeys'], 'storey')} (simulated)"
+    )
+    print("\nof storeys held back in turn (simulated scans):")
+    print_table(pa.Table.from_pylist(summary["scores"]))
+    return 0
+
+
+def run_again(
+    building: str | None,
+    storey: str | None,
+    scan: str | None,
+    stage: str | None,
+    store: Path | None,
+    jobs: int | None,
+    as_json: bool,
+) -> int:
+    """Run again the storeys whose last run did not do all it was asked for.
+
+    Parameters
+    ----------
+    scan, stage : str, optional
+        Only where this scan, or this stage, failed.
+    """
     settings = load_settings(store=store, jobs=jobs)
     root = writable(settings.store, "store", "--store or MAPSENSE_STORE")
     last = last_runs(read_runs(root, building, storey))
     # a campaign's energy is charged again by its own verb
     last = [run for run in last if run.verb != ENERGY]
     again = [run for run in last if run.state != COMPLETED and not goes_on(str(root), run)]
+    again = with_failures(str(root), again, scan, stage)
     if not again:
         if as_json:
             print("[]")
@@ -249,7 +309,10 @@ def _print_summary(summary: dict[str, Any], as_json: bool) -> None:
     simulated = ", simulated" if summary["simulated"] else ""
     print(
         f"{name}: {_count(found['rooms'], 'room')}, {found['area_m2']} m², "
-        f"{_count(found['walls'], 'wall')} from {_count(len(used['scans']), 'scan')} "
+        f"{_count(found['walls'], 'wall')}, {_count(found['doors'], 'door')}, "
+        f"{_count(found['windows'], 'window')}, "
+        f"{_count(found['furniture'], 'piece')} of furniture "
+        f"from {_count(len(used['scans']), 'scan')} "
         f"({used['points']:,} points{simulated}) in "
         f"{summary['seconds']:.1f} s, {cached} of {total} stages from the cache"
     )

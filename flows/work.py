@@ -1,6 +1,7 @@
 """Run what the command line asks for: the store checked, Prefect served, progress shown."""
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flows import progress
+from flows import logs, progress
 from flows.building import map_building, with_jobs
 from flows.energy import EnergyRequest, measure_energy
 from flows.evaluation import EvaluationRequest, evaluate_storey
@@ -16,11 +17,14 @@ from flows.experiment import ExperimentRequest, run_experiment
 from flows.outcomes import Outcome, RepeatsFailed
 from flows.request import StoreyRequest
 from flows.server import wait_until_up
+from flows.settings import load_settings
 from flows.storey import threads
+from flows.training import TrainRequest, train
 from storage.catalog import Catalog
 from storage.energy import STOREY
 from storage.errors import MapSenseError
 from storage.runs import COMPLETED, Run, read_runs
+from storage.stages import reason
 
 ENERGY_ANSWERS = {
     "simulated joules, one query a room": "energy_per_method",
@@ -97,6 +101,15 @@ def run_repeats(request: ExperimentRequest, jobs: int, show: bool) -> list[Outco
     return outcomes
 
 
+def run_training(request: TrainRequest, show: bool) -> dict[str, Any]:
+    """Train a classifier; return what came of it."""
+    with _engine(show):
+        state = train(request, return_state=True)
+    _raise_failure(state, f"training of {request.kind}")
+    summary: dict[str, Any] = state.result()
+    return summary
+
+
 def _raise_failure(state: Any, what: str) -> None:
     """Raise what stopped a flow, if it did not end well."""
     if state.is_completed():
@@ -124,6 +137,7 @@ def is_done(summary: dict[str, Any]) -> bool:
 
 @contextmanager
 def _engine(show: bool) -> Iterator[None]:
+    from httpx import TransportError
     from prefect.settings import PREFECT_FLOWS_HEARTBEAT_FREQUENCY, temporary_settings
 
     wait_until_up()
@@ -131,8 +145,15 @@ def _engine(show: bool) -> Iterator[None]:
     with (
         temporary_settings({PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None}),
         progress.shown(show),
+        logs.written(load_settings().log),
     ):
-        yield
+        try:
+            yield
+        except TransportError as error:
+            raise MapSenseError(
+                f"{os.environ['PREFECT_API_URL']}: Prefect's API does not answer any more "
+                f"({error}); run again, what was computed is kept"
+            ) from error
 
 
 def _outcome(request: StoreyRequest, state: Any) -> dict[str, Any]:
@@ -142,7 +163,9 @@ def _outcome(request: StoreyRequest, state: Any) -> dict[str, Any]:
     if isinstance(error, Exception) and not _recorded(request):
         raise error
     run = _recorded(request)
-    message = run.message if run is not None else state.message
+    # of a run whose end could not be written, as on a full disk, the record knows nothing
+    message = run.message if run is not None else ""
+    message = message or (reason(error) if isinstance(error, Exception) else state.message)
     failure = MapSenseError(f"{request.building}/{request.storey}: {message}")
     raise failure from (error if isinstance(error, BaseException) else None)
 

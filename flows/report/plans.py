@@ -7,7 +7,7 @@ from pathlib import Path
 
 from flows.outcomes import kept_in
 from flows.report.data import Answers, Row, grouped, is_initial, variant_name, variant_order
-from flows.results import FINAL, INITIAL
+from flows.results import FINAL, INITIAL, is_corrected
 from storage.errors import InputError
 from storage.plan import Plan
 from storage.plan_geojson import read_plan
@@ -18,7 +18,7 @@ from tasks.exports.report import Section
 
 MOST_STOREYS = 12
 """Storeys drawn: a page of more is not read any more."""
-SAME = "The final plan is the initial one: no grammar was applied."
+SAME = "The final plan has the initial one's rooms: no grammar was applied."
 
 
 def plan_section(answers: Answers, store: Path) -> Section:
@@ -80,10 +80,10 @@ def _storey(store: Path, name: str, rows: list[Row]) -> _Drawn:
             for title, each in _models(variant, path):
                 # plans of the same bytes are one panel
                 panels.setdefault(_digest(each), Panel(title, read_plan(each)))
+            if _is_same(path) and not is_initial(variant):
+                missing.append(f"{name}, {variant_name(variant)}: {SAME}")
         except (InputError, OSError) as error:
             missing.append(f"{name}, {variant_name(variant)}: not drawn ({error}).")
-        if _is_same(path) and not is_initial(variant):
-            missing.append(f"{name}, {variant_name(variant)}: {SAME}")
         try:
             truths[str(truth)] = read_truth(truth)
         except (InputError, OSError) as error:
@@ -124,11 +124,11 @@ def _models(variant: str, path: Path) -> list[tuple[str, Path]]:
 
 
 def _is_same(path: Path) -> bool:
-    """Return whether a plan is the initial one kept beside it."""
+    """Return whether a plan has the rooms and walls of the initial one kept beside it."""
     initial = path.with_name(INITIAL)
     if initial == path or not initial.is_file() or not path.is_file():
         return False
-    return initial.read_bytes() == path.read_bytes()
+    return not is_corrected(initial, path)
 
 
 def _digest(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 import os
 import re
+import stat
 from collections.abc import Iterable, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -61,7 +62,10 @@ def fingerprint(path: Path) -> Source:
     digest, size = sha256(), 0
     for file in files_of(path):
         try:
-            length = file.stat().st_size
+            status = file.stat()
+            if not stat.S_ISREG(status.st_mode):  # reading a pipe would never end
+                raise InputError(file, "is no regular file", "replace it by a file")
+            length = status.st_size
             # name and length first, so that no two sets of files give the same stream
             digest.update(f"{_relative(file, path)}\0{length}\0".encode())
             with open(file, "rb") as stream:

@@ -48,7 +48,21 @@ def served(prefect_server, monkeypatch):
     monkeypatch.setenv("PREFECT_API_URL", prefect_server)
 
 
-@pytest.mark.parametrize("verb", ["map", "demo", "simulate", "energy", "query", "status", "rerun"])
+VERBS = (
+    "map",
+    "demo",
+    "simulate",
+    "energy",
+    "train",
+    "query",
+    "status",
+    "rerun",
+    "deploy",
+    "prune",
+)
+
+
+@pytest.mark.parametrize("verb", VERBS)
 def test_help_shows_an_example(mapsense, verb):
     code, out, _ = mapsense(verb, "--help")
     assert code == 0

@@ -1,12 +1,16 @@
 """The comparison of the demo, and the plan made of tables."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from shapely import box
+from shapely import LineString, box
 
-from flows.demo import BUILDING, STOREY, compare_rooms, small_campaign
-from flows.model import Made, initial_plan
-from storage.plan import Plan, PlanRoom
+from flows.demo import BUILDING, STOREY, compare_objects, compare_rooms, small_campaign
+from flows.model import Made, initial_plan, with_furniture, with_openings
+from storage.furniture import Furniture
+from storage.openings import Openings
+from storage.plan import Plan, PlanOpening, PlanRoom, PlanWall
 from storage.plan_geojson import read_plan, write_plan
 from storage.rooms import Rooms
 from storage.walls import Walls
@@ -57,6 +61,18 @@ def test_a_storey_of_which_nothing_was_mapped_has_only_missed_rooms():
     }
 
 
+def test_objects_are_counted_by_what_is_there_what_was_found_and_what_is_both():
+    def door(name, x):
+        line = LineString([(x, 0), (x + 0.9, 0)])
+        return PlanOpening(name, line, sill_m=0.0, head_m=2.0, state="open")
+
+    truth = replace(plan((0, 0, 8, 5)), doors=(door("d0", 1), door("d1", 4)))
+    mapped = replace(plan((0, 0, 8, 5)), doors=(door("d0", 1.1), door("d1", 6), door("d2", 2.5)))
+    doors, *others = compare_objects(truth, mapped)
+    assert doors == {"object": "door", "true": 2, "found": 3, "matched": 1}
+    assert [(o["true"], o["found"], o["matched"]) for o in others] == [(0, 0, 0)] * 3
+
+
 def test_the_demos_volunteers_pass_the_quality_gate():
     truth = make_storey(StoreyParams(seed=0), BUILDING, STOREY)
     scene = Scene(storey_mesh(truth))
@@ -91,3 +107,40 @@ def test_a_plan_keeps_what_is_unknown_unknown(tmp_path):
     assert [wall.rooms for wall in made.walls] == [("r0", "r1"), ("r0",)]
     assert [wall.thickness_m for wall in made.walls] == [0.1, None]
     assert made.notes == ("a note",)
+
+
+def test_doors_windows_and_furniture_are_read_back_as_they_were_found(tmp_path):
+    openings = Openings(
+        kinds=np.array(["door", "door", "window"]),
+        lines=np.array([[[1.0, 0], [2, 0]], [[4, 1], [4, 2]], [[0, 3], [0, 4.5]]]),
+        sill_m=np.array([0.0, 0.0, 0.9]),
+        head_m=np.array([2.0, 2.1, 2.2]),
+        walls=np.array([0, 1, 2], np.int32),
+        rooms=np.array([[0, -1], [0, 1], [0, -1]], np.int32),
+        states=np.array(["open", "unknown", ""]),
+        confidences=np.array([0.9, 0.6, 0.7]),
+    )
+    furniture = Furniture(
+        footprints=np.array([box(1, 1, 2, 1.8), box(5, 1, 5.5, 1.5)], object),
+        classes=np.array(["table", "chair"]),
+        base_m=np.zeros(2),
+        top_m=np.array([0.72, 0.9]),
+        rooms=np.array([0, -1], np.int32),
+        confidences=np.array([0.8, 0.5]),
+    )
+    lines = [((0, 0), (4, 0)), ((4, 0), (4, 5)), ((0, 0), (0, 5))]
+    walls = tuple(PlanWall(f"w{i}", LineString(line)) for i, line in enumerate(lines))
+    bare = replace(plan((0, 0, 4, 5), (4, 0, 8, 5)), walls=walls)
+    write_plan(with_furniture(with_openings(bare, openings), furniture), tmp_path / "plan.geojson")
+    found = read_plan(tmp_path / "plan.geojson")
+    assert [(d.state, d.wall, d.rooms) for d in found.doors] == [
+        ("open", "w0", ("r0",)),
+        ("unknown", "w1", ("r0", "r1")),
+    ]
+    (window,) = found.windows
+    assert (window.state, window.sill_m, window.head_m, window.confidence) == (None, 0.9, 2.2, 0.7)
+    assert window.line.length == pytest.approx(1.5)
+    assert [(p.class_, p.room, p.top_m) for p in found.furniture] == [
+        ("table", "r0", 0.72),
+        ("chair", None, 0.9),
+    ]

@@ -299,7 +299,7 @@ def test_an_unrefined_plan_is_one_panel_and_said_to_be_the_initial_one(tmp_path)
     answers = ask(made.root, None)
     plans = plan_section(answers, made.root)
     assert plans.missing == (
-        "hut / 0, final: The final plan is the initial one: no grammar was applied.",
+        "hut / 0, final: The final plan has the initial one's rooms: no grammar was applied.",
     )
     assert [picture.name for picture in plans.pictures] == [
         "figure_15_hut_0_1",

@@ -26,6 +26,9 @@ PER_SCAN = (
     *("clouds", "quality", "voxels", "streams"),
     *("decoded", "planes", "segments", "occupancy"),
 )
+OBJECTS = dict.fromkeys(
+    ("wall_images", "opening_candidates", "openings", "furniture_segments", "furniture"), 1
+)
 UPRIGHT = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
 """Rotation of a device held upright: a roll of 90 degrees."""
 ON_ITS_BACK = (1.0, 0.0, 0.0, 0.0)
@@ -115,7 +118,7 @@ def mapped(prefect_server, tmp_path, scans):
 
 def test_a_storey_is_mapped_and_an_unchanged_rerun_computes_nothing(mapped, tmp_path):
     state, summary, counts = mapped()
-    every = stages_of(2, faces=1, rooms=1)
+    every = stages_of(2, faces=1, rooms=1, **OBJECTS)
     assert state.is_completed()
     assert counts == {"computed": every, "cached": {}, "failed": {}}
     assert (summary["state"], summary["skipped"], summary["rejected"]) == ("completed", [], [])
@@ -140,8 +143,11 @@ def test_a_storey_is_mapped_and_an_unchanged_rerun_computes_nothing(mapped, tmp_
 def test_a_changed_parameter_recomputes_its_stage_and_what_follows(mapped_before, mapped):
     params = MapSenseParams.model_validate({"filter": {"cell_m": 0.12}})
     _, _, counts = mapped(params=params)
-    assert counts["computed"] == {"segments": 2, "faces": 1, "rooms": 1}
-    assert counts["cached"] == stages_of(2, *(s for s in PER_SCAN if s != "segments"))
+    # coarser segments give the walls other places, and their images the same rectangles: none
+    same = {"opening_candidates": 1}
+    assert counts["computed"] | same == {"segments": 2, "faces": 1, "rooms": 1} | OBJECTS
+    unchanged = stages_of(2, *(s for s in PER_SCAN if s != "segments"))
+    assert counts["cached"].items() >= unchanged.items()
 
 
 def test_the_server_works_on_what_was_decoded(mapped_before, mapped, tmp_path):
@@ -149,7 +155,7 @@ def test_the_server_works_on_what_was_decoded(mapped_before, mapped, tmp_path):
     _, _, counts = mapped(params=params)
     assert counts["cached"] == stages_of(2, "clouds", "quality", "voxels")
     changed = ("streams", "decoded", "planes", "segments", "occupancy")
-    assert counts["computed"] == stages_of(2, *changed, faces=1, rooms=1)
+    assert counts["computed"] == stages_of(2, *changed, faces=1, rooms=1, **OBJECTS)
     rows = run_query(
         tmp_path / "store",
         "select s.stage, s.points_in, s.points_out, t.cells, t.points "
@@ -183,7 +189,7 @@ def test_a_broken_scan_is_skipped_with_its_reason_and_made_up_for_later(
     write_bundle(scans / "b.scan", clouds[1], none())
     _, summary, counts = mapped()
     assert summary["state"] == "completed"
-    assert counts["computed"] == stages_of(1, faces=1, rooms=1)
+    assert counts["computed"] == stages_of(1, faces=1, rooms=1, **OBJECTS)
     assert counts["cached"] == stages_of(1)
 
 
@@ -207,7 +213,7 @@ def test_the_quality_gate_keeps_back_what_is_sparse_or_skewed(mapped, tmp_path, 
     ]
     (used,) = summary["used"]["scans"]
     assert (used["scan"], used["p_in"], used["p_sk"], used["p_sum"]) == ("good", 0, 0, 0)
-    assert counts["computed"] == stages_of(1, clouds=3, quality=3, faces=1, rooms=1)
+    assert counts["computed"] == stages_of(1, clouds=3, quality=3, faces=1, rooms=1, **OBJECTS)
     plan = read_plan(tmp_path / "out" / "plan.geojson")
     assert [room.scans for room in plan.rooms] == [("good",)]
     assert "made from 1 of 3 scans" in plan.notes
@@ -216,7 +222,7 @@ def test_the_quality_gate_keeps_back_what_is_sparse_or_skewed(mapped, tmp_path, 
     assert (summary["state"], summary["message"], summary["rejected"]) == ("completed", "", [])
     assert [s["scan"] for s in summary["used"]["scans"]] == ["good", "skewed", "sparse"]
     assert [round(s["p_sum"], 3) for s in summary["used"]["scans"]] == [0, 0.989, 1]
-    assert counts["computed"] == stages_of(2, *PER_SCAN[2:], quality=3, faces=1, rooms=1)
+    assert counts["computed"] == stages_of(2, *PER_SCAN[2:], quality=3, faces=1, rooms=1, **OBJECTS)
     assert counts["cached"] == stages_of(1, *PER_SCAN[2:], clouds=3)
 
 
@@ -307,5 +313,28 @@ def test_a_stage_over_all_scans_that_raises_fails_the_run_and_keeps_what_was_com
         ("(run)", "ZeroDivisionError: no"),
     }
     _, summary, counts = mapped()
-    assert counts["computed"] == {"rooms": 1}
+    assert counts["computed"] == {"rooms": 1} | OBJECTS
     assert summary["state"] == "completed"
+
+
+def test_what_cannot_be_looked_for_is_said_and_leaves_the_rest(mapped, monkeypatch, tmp_path):
+    from flows import objects
+
+    def shipped(kind):
+        return tmp_path / "none.parquet" if kind == "doors" else path_of(kind)
+
+    path_of = objects.shipped
+    monkeypatch.setattr(objects, "shipped", shipped)
+    state, summary, counts = mapped()
+    assert state.is_completed()
+    assert summary["state"] == "partial"
+    assert "doors not looked for" in summary["message"] and "none.parquet" in summary["message"]
+    assert counts["computed"]["furniture"] == 1 and "openings" not in counts["computed"]
+    assert read_plan(tmp_path / "out" / "plan.geojson").rooms
+
+
+def test_nothing_is_looked_for_that_was_not_asked_for(mapped):
+    params = MapSenseParams.model_validate({"detect": ["furniture"]})
+    _, summary, counts = mapped(params=params)
+    assert summary["found"]["doors"] == summary["found"]["windows"] == 0
+    assert OBJECTS.keys() & counts["computed"].keys() == {"furniture_segments", "furniture"}
