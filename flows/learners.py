@@ -65,6 +65,6 @@ def _real_sizes(simulated: Examples) -> Examples:
 LEARNERS: Mapping[Kind, Learner] = {
     "doors": Learner(OPENING_FEATURES, OPENING_CLASSES, ForestParams(), _openings, nothing_more),
     "furniture": Learner(
-        FURNITURE_FEATURES, FURNITURE_CLASSES, ForestParams(), _furniture, _real_sizes
+        FURNITURE_FEATURES, FURNITURE_CLASSES, ForestParams(trees=8), _furniture, _real_sizes
     ),
 }

@@ -90,7 +90,7 @@ def draw_wall(
     )
     images, pixel_m = looked.images, looked.images.pixel_m
     ids = f"wall w{images.walls[face]} from room r{images.rooms[face]}"
-    note = f"{building}/{storey}, {looked.run.started_at:%Y-%m-%d}; pixels of {pixel_m:g} m"
+    note = f"{building}/{storey}, {looked.run.started_at:%Y-%m-%d}; pixels of {pixel_m:.2g} m"
     title = f"{ids}: {len(steps.doors)} of {len(looked.openings.of_kind(DOOR))} doors"
     draw_panels(panels(images, face, steps), pixel_m, title, note, out)
     found = {

@@ -12,21 +12,11 @@ from storage.layout_walls import LayoutWalls
 from storage.points import PointCloud
 from storage.rooms import Rooms
 from storage.snapshots import Snapshots
-from storage.wall_images import EMPTY, NOT_SEEN, OCCLUDED, OCCUPIED, WallImages
+from storage.wall_images import WallImages
 from storage.walls import Walls
 from tasks.doors.faces import WallFaces, wall_faces
-from tasks.doors.rays import (
-    ASIDE,
-    HIT,
-    PASSED,
-    STOPPED,
-    Canvas,
-    Eyes,
-    Limits,
-    Votes,
-    cast_rays,
-    uncast,
-)
+from tasks.doors.labelling import labelled, scanned, without_holes
+from tasks.doors.rays import Canvas, Eyes, Limits, Votes, cast_rays, uncast
 from tasks.doors.relief import LAYER_M, layered, relief, standing
 from tasks.doors.spacing import FINEST_M, spacing_m
 from tasks.doors.viewpoints import ViewParams, chosen, interior_eyes, of_room, snapshot_eyes
@@ -64,6 +54,13 @@ class TraceParams(Params):
     """A ray that ends within the wall, further than this behind its face and beside its pixel, did
     not end at it, metres: it came in by an opening and met the reveal, or a leaf elsewhere. A
     voxel's edge. Not in the paper."""
+    over_m: PositiveFloat = 2.1
+    """Higher than this over its foot a wall is closed, metres: heads of doors lie at 2 m. In a room
+    without snapshots, rays that go through there as well tell of a wall that was not scanned.
+    Assumption."""
+    least_wall: float = Field(default=0.7, ge=0, le=1)
+    """Share of the pixels reached up there that were hit, on the one of a wall's faces that has
+    more; below it what is empty as seen from assumed places is NOT_SEEN. Not in the paper."""
     behind_m: PositiveFloat = 3.0
     """How far behind the face a ray is followed, metres. Assumption."""
     least_incidence: float = Field(default=0.4, ge=0, lt=1)
@@ -131,6 +128,7 @@ def trace_walls(
     faces = wall_faces(rooms, walls)
     base, top = _heights(walls, points)
     params = as_coarse(params, _spacing(walls, base, top, points))
+    eyes, assumed = _eyes_of_rooms(rooms, snapshots, params.view)
     planned = _canvases(faces, base[faces.walls], top[faces.walls], params.pixel_m)
     layers = layered(points, planned, params.astray_m + params.relief_m)
     thickness = np.where(np.isnan(faces.thickness_m), np.inf, faces.thickness_m)
@@ -138,12 +136,16 @@ def trace_walls(
     stands = np.array([standing(layers, f, params.astray_m, within[f]) for f in range(len(faces))])
     canvases = [canvas.moved(depth) for canvas, depth in zip(planned, stands, strict=True)]
     if params.pixel_m < params.coarsest_m:
-        votes = _cast(faces, canvases, thickness - stands, rooms, points, snapshots, params)
+        votes = _cast(faces, canvases, thickness - stands, eyes, points, params)
     else:
         votes = [uncast(canvas) for canvas in canvases]
     behind = np.clip(thickness - stands - params.other_face_m, params.d, params.relief_m)
     reliefs = [relief(layers, f, stands[f], params.relief_m, behind[f]) for f in range(len(faces))]
-    seen = [_seen(*of_face, params.empty_share) for of_face in zip(votes, reliefs, strict=True)]
+    seen = [labelled(*of_face, params.empty_share) for of_face in zip(votes, reliefs, strict=True)]
+    over_doors = round(params.over_m / params.pixel_m)
+    sure = scanned(seen, faces.opposite, over_doors, params.least_wall)
+    for face in np.flatnonzero(assumed[faces.rooms] & ~sure):
+        seen[face] = without_holes(seen[face])
     return WallImages(
         pixel_m=params.pixel_m,
         walls=faces.walls,
@@ -237,15 +239,13 @@ def _cast(
     faces: WallFaces,
     canvases: list[Canvas],
     thickness: NDArray[np.float64],
-    rooms: Rooms,
+    eyes: list[Eyes],
     points: list[PointCloud],
-    snapshots: list[Snapshots],
     params: TraceParams,
 ) -> list[Votes]:
     """Cast the rays of all faces; each thread takes the next face."""
     if not canvases:
         return []
-    eyes = _eyes_of_rooms(rooms, snapshots, params.view)
     corners = np.concatenate([canvas.corners() for canvas in canvases])
     low, high = corners.min(axis=0) - AIR_M, corners.max(axis=0) + AIR_M
     field = distance_field(points, params.voxel_m, params.least_points, low, high)
@@ -257,17 +257,22 @@ def _cast(
         return list(threads.map(one, range(len(faces))))
 
 
-def _eyes_of_rooms(rooms: Rooms, snapshots: list[Snapshots], params: ViewParams) -> list[Eyes]:
+def _eyes_of_rooms(
+    rooms: Rooms, snapshots: list[Snapshots], params: ViewParams
+) -> tuple[list[Eyes], NDArray[np.bool_]]:
+    """Return where rays start in each room, and whether these places are assumed ones."""
     every = snapshot_eyes(snapshots, params)
     known = rooms.floor_m[~np.isnan(rooms.floor_m)]
     usual = float(np.median(known)) if len(known) else 0.0
-    found = []
+    found: list[Eyes] = []
+    assumed: list[bool] = []
     for polygon, floor in zip(rooms.polygons, rooms.floor_m, strict=True):
         eyes = of_room(every, polygon, params.near_room_m)
-        if not len(eyes):
+        assumed.append(not len(eyes))
+        if assumed[-1]:
             eyes = interior_eyes(polygon, usual if np.isnan(floor) else float(floor), params)
         found.append(eyes)
-    return found
+    return found, np.array(assumed, bool)
 
 
 def _votes(
@@ -292,27 +297,3 @@ def _votes(
         )
         rounds.append((chosen(eyes, canvas, least_cosine, params.view.snapshots), limits))
     return cast_rays(field, canvas, rounds)
-
-
-def _seen(
-    votes: Votes, relief: NDArray[np.float32], empty_share: float
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.uint8]]:
-    """Return a face's labels, depths, and shares of the rays that went through."""
-    stopped, hit, aside, through = votes.counts
-    # what ended within the wall beside its pixel met the surface behind the face that the pixel's
-    # points lie on, or else came in by an opening
-    closed = ~np.isnan(relief)
-    passed = through + np.where(closed, 0, aside)
-    reached = hit + aside + through
-    wall = np.where(passed >= empty_share * reached, EMPTY, OCCUPIED)
-    hidden = np.where(stopped > 0, OCCLUDED, NOT_SEEN)
-    label = np.where(reached > 0, wall, hidden).astype(np.uint8)
-    depth = np.where((label == OCCUPIED) & closed, relief, np.nan).astype(np.float32)
-    of_ends = (
-        (OCCUPIED, HIT), (OCCUPIED, ASIDE), (EMPTY, PASSED), (EMPTY, ASIDE), (OCCLUDED, STOPPED)
-    )  # fmt: skip
-    for value, end in of_ends:
-        of_rays = (label == value) & np.isnan(depth) & (votes.counts[end] > 0)
-        depth[of_rays] = votes.depth_m[end][of_rays] / votes.counts[end][of_rays]
-    empty = np.rint(255 * passed / np.maximum(reached, 1)).astype(np.uint8)
-    return label, depth, empty

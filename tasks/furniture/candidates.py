@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from tasks.furniture.boxes import Box
 
 BACK, SEAT, TOP, FRONT, ON_TABLE = range(5)
-"""What a candidate was found by: a back, a patch at seat height, any other patch, the front of a tall
-piece, a panel on a table."""
+"""What a candidate was found by: a back, a patch at seat height, any other patch, the front of a
+tall piece, a panel on a table."""
 
 
 @dataclass(frozen=True, eq=False)

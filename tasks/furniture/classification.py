@@ -28,7 +28,7 @@ class FurnitureParams(Params):
 
     table: Share = 0.4
     """Least confidence of a table."""
-    chair: Share = 0.4
+    chair: Share = 0.35
     """Least confidence of a chair."""
     other: Share = 0.5
     """Least confidence of anything else."""

@@ -63,8 +63,8 @@ The last three kinds are assumptions."""
 SHALLOW_M = 0.47
 """Depth up to which a piece is an office cabinet or a shelf, metres; deeper ones are cupboards."""
 CABINETS_M, CUPBOARDS_M = (0.8, 1.0, 1.2), (0.6, 0.7)
-"""Usual widths: of office cabinets and shelves (800, 1000 and 1200 mm), of kitchen cupboards (600 mm,
-EN 1116) and washstands. The last is an assumption."""
+"""Usual widths: of office cabinets and shelves (800, 1000 and 1200 mm), of kitchen cupboards (600
+mm, EN 1116) and washstands. The last is an assumption."""
 
 
 def widths_m(depth_m: float) -> tuple[float, ...]:

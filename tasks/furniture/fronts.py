@@ -23,6 +23,10 @@ GAP_M = 0.14
 """Greatest gap in a front, and between its end and the corner of the room it is moved to."""
 
 
+BELOW, HELD = 10, 3
+"""Slices down from an upper edge, and how many of them must hold points: else it is a stray."""
+
+
 class FrontParams(Params):
     """What may be the front of a tall piece. Assumptions; the paper has none."""
 
@@ -78,8 +82,9 @@ def _tall(scene: Scene, params: FrontParams) -> _Columns:
     over = scene.slices(places, params.ceiling_m, np.inf) > 0
     # a stray point has nothing right below
     close = np.cumsum(counts, axis=1)
-    below = close - np.pad(close, ((0, 0), (10, 0)))[:, :-10]
-    firm = counts & (below >= 3)
+    earlier = np.zeros_like(close)
+    earlier[:, BELOW:] = close[:, :-BELOW]
+    firm = counts & (close - earlier >= HELD)
     top_slice = counts.shape[1] - 1 - np.argmax(firm[:, ::-1], axis=1)
     first = scene.columns.slice_of(params.low_m)
     top = scene.columns.height_of((first + top_slice).astype(float))

@@ -59,6 +59,7 @@ VERBS = (
     "rerun",
     "deploy",
     "prune",
+    "wall",
 )
 
 

@@ -57,7 +57,7 @@ def test_segments_come_back_with_their_features_and_names(tmp_path, n):
     assert found.names == value.names
     assert found.features.shape == (n, 2)
     assert np.array_equal(found.features, value.features, equal_nan=True)
-    for name in ("surface_m", "top_m", "floor_m", "rooms"):
+    for name in ("surface_m", "top_m", "base_m", "rooms"):
         assert getattr(found, name).tolist() == getattr(value, name).tolist()
     for name in ("footprints", "hulls"):
         assert shapely.equals(getattr(found, name), getattr(value, name)).all()

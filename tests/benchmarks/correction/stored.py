@@ -1,6 +1,6 @@
-"""Initial models that a store holds, as grammars correct them; read without running a stage."""
+"""Initial models that a store holds, and what they were made of; read without running a stage."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,10 +19,16 @@ from storage.walls import Walls
 MADE = """
 select s.building, s.storey, r.seed, s.run, s.stage, s.scan, unnest(s.outputs) as uri
 from stages s join runs r on s.run = r.id and s.building = r.building and s.storey = r.storey
-where s.stage in ('faces', 'rooms', 'segments') and r.state in ('completed', 'partial')
-  and s.outcome != 'failed'
+where r.state in ('completed', 'partial') and s.outcome != 'failed'
 order by r.started_at
 """
+INITIAL: Mapping[str, str] = {
+    "faces": "faces",
+    "rooms": "rooms",
+    "walls": "rooms",
+    "segments": "segments",
+}
+"""What a grammar corrects: tables, and the stage each is of."""
 
 
 @dataclass(frozen=True)
@@ -36,31 +42,49 @@ class Stored:
 
     def read(self) -> tuple[Rooms, Walls, Faces, list[Segments]]:
         """Return the initial model; segments scan by scan, in the storey's order."""
-        made = {uri.split("/", 1)[0]: uri for uri in self.uris}
-        each = [uri for uri in self.uris if uri.startswith("segments/")]
         return (
-            rooms.from_table(self._table(made["rooms"])),
-            walls.from_table(self._table(made["walls"])),
-            faces.from_table(self._table(made["faces"])),
-            [segments.from_table(self._table(uri)) for uri in each],
+            rooms.from_table(self.one("rooms")),
+            walls.from_table(self.one("walls")),
+            faces.from_table(self.one("faces")),
+            [segments.from_table(table) for table in self.each("segments")],
         )
 
-    def _table(self, uri: str) -> pa.Table:
-        return pq.read_table(self.store / uri, partitioning=None)
+    def one(self, table: str) -> pa.Table:
+        """Return a table of the whole storey."""
+        (made,) = self.each(table)
+        return made
+
+    def each(self, table: str) -> list[pa.Table]:
+        """Return a table of each scan."""
+        uris = [uri for uri in self.uris if uri.startswith(f"{table}/")]
+        return [pq.read_table(self.store / uri, partitioning=None) for uri in uris]
 
 
-def stored_models(scored: Sequence[Scored], stores: Sequence[Path], seeds: int) -> list[Stored]:
-    """Return the initial models of storeys in some stores, the last made of each seed."""
+def stored_models(
+    scored: Sequence[Scored],
+    stores: Sequence[Path],
+    seeds: int,
+    wanted: Mapping[str, str] = INITIAL,
+) -> list[Stored]:
+    """Return the initial models of storeys in some stores, the last made of each seed.
+
+    Parameters
+    ----------
+    wanted : tables, and the stage each is of
+    """
     found: dict[tuple[str, str, int], Stored] = {}
     by_place = {(s.building, s.storey): s for s in scored}
     for store in stores:
         uris: dict[tuple[str, str, int, str], list[tuple[str, str]]] = {}
         for row in _made(store):
-            if (row["building"], row["storey"]) in by_place:
+            table = row["uri"].split("/", 1)[0]
+            is_wanted = wanted.get(table) == row["stage"]
+            if is_wanted and (row["building"], row["storey"]) in by_place:
                 key = (row["building"], row["storey"], row["seed"] or 0, row["run"])
                 uris.setdefault(key, []).append((row["scan"] or "", row["uri"]))
         for (building, storey, seed, _), made in uris.items():
-            if seed < seeds:
+            tables = {uri.split("/", 1)[0] for _, uri in made}
+            if seed < seeds and tables == set(wanted):
                 paths = tuple(uri for _, uri in sorted(set(made)))
                 of = by_place[building, storey]
                 found[building, storey, seed] = Stored(of, seed, store, paths)

@@ -209,3 +209,60 @@ def test_a_storey_without_walls_or_without_points_has_nothing_to_show():
     assert len(trace_walls(rooms, none_of, [], [], TraceParams())) == 0
     blank = trace_walls(rooms, walls, [], [], TraceParams())
     assert all((label == NOT_SEEN).all() for label in blank.labels)
+
+
+def thinned(cloud, spacing):
+    """Return one point of each cube of this edge, as scans are thinned out before they are sent."""
+    shuffled = np.random.default_rng(1).permutation(cloud.xyz)
+    # walls run through the middle of cubes: noise would put a wall between cubes into both
+    cubes = np.floor(shuffled / spacing + 0.5)
+    _, first = np.unique(cubes, axis=0, return_index=True)
+    return PointCloud(shuffled[first], cloud.origin)
+
+
+@pytest.mark.parametrize("eyes", [none(), snapshots()], ids=["assumed places", "snapshots"])
+def test_pixels_and_voxels_of_a_thin_scan_are_as_coarse_as_its_points(cloud, eyes):
+    found = trace_walls(*model(), [thinned(cloud, 0.1)], [eyes], ALL_ROUND)
+    assert found.pixel_m == pytest.approx(0.1, abs=0.02)
+    inside, outside = expected(*pixels(found, 0), 0.12)
+    assert (found.labels[0][inside] == EMPTY).mean() > 0.95
+    assert (found.labels[0][outside] == EMPTY).mean() < 0.1
+
+
+def test_finer_voxels_than_points_are_full_of_holes(cloud):
+    finer = ALL_ROUND.model_copy(update={"per_spacing": 0.01})
+    found = trace_walls(*model(), [thinned(cloud, 0.1)], [snapshots()], finer)
+    _, outside = expected(*pixels(found, 0), 0.12)
+    assert found.pixel_m == ALL_ROUND.pixel_m
+    assert (found.labels[0][outside] == EMPTY).mean() > 0.3
+
+
+def test_of_points_further_apart_than_a_door_can_be_seen_in_nothing_is_said(cloud):
+    found = trace_walls(*model(), [thinned(cloud, 0.35)], [snapshots()], ALL_ROUND)
+    assert all((label == NOT_SEEN).all() for label in found.labels)
+    assert (found.rays == 0).all()
+
+
+def test_holes_of_a_wall_that_was_not_scanned_say_nothing_where_places_are_assumed(cloud):
+    x, y, z = cloud.xyz.T
+    between = (y > 2.9) & (y < 3.3) & (x < 3) & (z > 0.05) & (z < HIGH - 0.05)
+    gone = PointCloud(cloud.xyz[~between], cloud.origin)
+    images, holes = {}, {}
+    for name, eyes in (("assumed", none()), ("known", snapshots())):
+        images[name] = trace_walls(*model(), [gone], [eyes], ALL_ROUND)
+        holes[name] = (images[name].labels[0] == EMPTY).mean()
+    assert holes["assumed"] == 0 and holes["known"] > 0.3
+    label, depth, empty = (s[0] for s in (
+        images["assumed"].labels, images["assumed"].depths, images["assumed"].empty))  # fmt: skip
+    assert (label == NOT_SEEN).mean() > 0.3 and (label == OCCUPIED).any()
+    assert np.isnan(depth[label == NOT_SEEN]).all() and not empty[label == NOT_SEEN].any()
+
+
+def test_a_wall_scanned_from_one_side_alone_keeps_its_holes_on_both(cloud):
+    _, y, z = cloud.xyz.T
+    north_face = (y > 3.15) & (y < 3.25) & (z > HEAD + 0.05) & (z < HIGH - 0.05)
+    half = PointCloud(cloud.xyz[~north_face], cloud.origin)
+    found = trace_walls(*model(), [half], [none()], ALL_ROUND)
+    for face in (0, 1):
+        inside, _ = expected(*pixels(found, face), 0.08)
+        assert (found.labels[face][inside] == EMPTY).mean() > 0.9

@@ -11,6 +11,7 @@ from tasks.exports.door_panels import (
     Panel,
     depth_image,
     draw_panels,
+    edge_image,
     label_image,
     mask_image,
     traced_panels,
@@ -80,3 +81,27 @@ def test_panels_of_different_shapes_or_none_are_refused(tmp_path):
     for panels in (two, []):
         with pytest.raises(ValueError, match="one shape"):
             draw_panels(panels, 0.04, "", "", tmp_path / "a.png")
+
+
+def test_edges_of_one_detector_alone_are_coloured_and_those_of_both_are_ink():
+    canny = np.array([[True, True, False, False]])
+    picture = edge_image(canny, np.array([[True, False, True, False]]))[0]
+    assert len({tuple(colour) for colour in picture}) == 4
+    assert picture[0].max() < 0.3 and (picture[3] == 1).all()
+    assert picture[1].argmax() == 2 and picture[2].argmax() == 0  # Canny's blue, Sobel's red
+
+
+def test_groups_of_rectangles_are_told_apart_by_colour(tmp_path):
+    white, boxes = np.ones((100, 60, 3)), np.array([[0.2, 0.2, 1.2, 2.0], [2.0, 0.2, 3.0, 2.0]])
+    found = []
+    for groups in ((0, 0), (0, 1), (0, -1)):
+        path = tmp_path / f"{groups}.png"
+        panel = Panel("", white, rectangles=boxes, groups=np.array(groups))
+        draw_panels([panel], 0.04, "", "", path)
+        found.append(matplotlib.image.imread(path)[..., :3])
+    alike, apart, of_none = found
+    for other in (apart, of_none):
+        changed = np.argwhere((alike != other).any(axis=2))
+        high, wide = np.ptp(changed, axis=0)
+        assert wide / high == pytest.approx(1.0 / 1.8, rel=0.05)  # the right one alone
+    assert (apart != of_none).any()

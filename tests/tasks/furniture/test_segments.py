@@ -52,7 +52,7 @@ def test_heights_count_from_the_floor_of_the_room():
     (row,) = of_kind(segments, TOP)
     assert segments.surface_m[row] == pytest.approx(3.84, abs=0.015)
     assert segments.features[row, FEATURES.index("distance_m")] == pytest.approx(0.74, abs=0.015)
-    assert segments.floor_m[row] == 3.1
+    assert segments.base_m[row] == 3.1
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.25, np.pi / 2])
@@ -115,7 +115,8 @@ def test_a_top_in_two_parts_with_what_hides_between_is_one():
 
 def test_two_tables_with_the_floor_between_stay_two():
     segments = found(floor(), plate(1.5, 2.5, 1.2, 0.6, 0.74), plate(3.1, 2.5, 1.2, 0.6, 0.74))
-    assert len(of_kind(segments, TOP)) == 2
+    whole = segments.features[:, FEATURES.index("siblings")] == 1
+    assert len(np.intersect1d(of_kind(segments, TOP), np.flatnonzero(whole))) == 2
 
 
 def test_nothing_lower_than_the_cut_off_is_furniture():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tasks.furniture.boxes import Box
-from tasks.furniture.dimensions import TABLES_M
-from tasks.furniture.splitting import SplitParams, pieces, split_grid
+from tasks.furniture.dimensions import TABLES_M, widths_m
+from tasks.furniture.splitting import RunParams, SplitParams, pieces, split_grid, split_run
 
 NONE = np.empty((0, 2))
 
@@ -52,3 +52,19 @@ def test_pieces_tile_their_box():
     for part in parts[1:]:
         union = union.union(part.polygon)
     assert union.symmetric_difference(box.polygon).area < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("length", "depth", "n"),
+    [
+        (0.8, 0.42, 1),
+        (1.6, 0.42, 2),  # 2 x 0.8 m
+        (2.04, 0.42, 2),  # 2 x 1.0 m, measured 4 cm off
+        (3.6, 0.42, 3),  # 3 x 1.2 m
+        (1.8, 0.6, 3),  # cupboards, 0.6 m each
+        (1.4, 0.6, 2),  # washstands, 0.7 m each
+        (0.35, 0.42, 1),  # of no standard width
+    ],
+)
+def test_a_run_is_as_many_pieces_as_make_its_length(length, depth, n):
+    assert split_run(length, widths_m(depth), RunParams()) == n
