@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat
+from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from storage.candidates import FEATURES, SHARES, Candidates
 from storage.forest import Forest
@@ -18,7 +18,7 @@ from tasks.doors.crosscheck import CrossCheckParams, distinct, on_walls
 from tasks.doors.examples import CLASSES, DOOR_CLASSES
 from tasks.doors.merging import MergingParams, Rectangles, per_door, per_wall, weights
 from tasks.doors.states import StateParams, states
-from tasks.doors.topology import TopologyParams, only_doors, rooms_beside
+from tasks.doors.topology import TopologyParams, doors_of_rooms, rooms_beside
 from tasks.doors.trajectory import TrajectoryParams, crossed, crossings, steps
 from tasks.forest import predict
 from tasks.params import Params
@@ -36,6 +36,9 @@ class OpeningsParams(Params):
     half of an open door looks like one. Assumption."""
     least_p: float = Field(default=0.1, ge=0, le=1)
     """Candidates less probable than this are not looked at any more. Assumption."""
+    door_agree: PositiveInt = 6
+    """A door is as probable as so many of its rectangles are on average, the most probable ones:
+    one of many is by chance. Windows have fewer. Not in the paper, which has one. Assumption."""
     crossing_weight: NonNegativeFloat = 3.0
     """What a path through a candidate adds to its log-odds of being a door; 0 leaves paths out. Not
     in the paper. Assumption."""
@@ -58,10 +61,11 @@ class OpeningsParams(Params):
 
 PAPER = OpeningsParams(
     least_p=0.5,
+    door_agree=1,
     crossing_weight=0.0,
     winner="wall",
     faces="each",
-    topology=TopologyParams(only_door_p=1.0),
+    topology=TopologyParams(only_door_p=1.0, second_door_p=0.0),
 )
 """The paper's own way: no path, no other face, one winner per wall, nothing asked of rooms."""
 
@@ -144,13 +148,13 @@ def told_openings(
     on = images.walls[candidates.faces]
     door_p = door_probabilities(told, on, boxes, walls, snapshots, params)
     window_p = told[:, CLASSES.index(WINDOW)]
-    doors = _merged(candidates, on, boxes, told, door_p, params)
-    windows = _merged(candidates, on, boxes, told, window_p, params)
+    doors = _merged(candidates, on, boxes, told, door_p, params.door_agree, params)
+    windows = _merged(candidates, on, boxes, told, window_p, 1, params)
     windows = windows.take(windows.confidences >= params.window_p)
     doors, windows = _one_per_place(doors, windows, walls, params)
     linked = rooms_beside(doors.lines(walls), doors.walls, walls, rooms, params.topology)
-    taken = doors.confidences >= params.door_p
-    taken = only_doors(linked, doors.confidences, taken, len(rooms), params.topology)
+    sure = doors.confidences
+    taken = doors_of_rooms(linked, sure, params.door_p, len(rooms), params.topology)
     doors, linked = doors.take(taken), linked[taken]
     beside = rooms_beside(windows.lines(walls), windows.walls, walls, rooms, params.topology)
     return Openings(
@@ -243,6 +247,7 @@ def _merged(
     boxes: NDArray[np.float64],
     told: NDArray[np.float64],
     p: NDArray[np.float64],
+    agree: int,
     params: OpeningsParams,
 ) -> _Found:
     """Return one opening for all candidates at one place, by their probability to be of a kind."""
@@ -266,7 +271,7 @@ def _merged(
             _Found(
                 walls=np.full(len(there), on[rows[0]], np.int32),
                 boxes=means[there],
-                confidences=np.array([p[some].max() for some in members]),
+                confidences=np.array([np.sort(p[some])[-agree:].mean() for some in members]),
                 states=np.array(leaf).reshape(-1, 3),
             )
         )

@@ -9,7 +9,7 @@ from storage.walls import Walls
 from tasks.doors.crosscheck import CrossCheckParams, distinct, on_walls
 from tasks.doors.merging import MergingParams, Rectangles, iou, per_door, per_wall
 from tasks.doors.states import StateParams, states
-from tasks.doors.topology import TopologyParams, only_doors, rooms_beside
+from tasks.doors.topology import TopologyParams, doors_of_rooms, rooms_beside
 
 PARAMS = MergingParams()
 EMPTY_SHARES, FULL_SHARES = (0.1, 0.9, 0.0), (0.9, 0.1, 0.0)
@@ -122,11 +122,23 @@ def test_a_door_links_the_rooms_of_its_wall_or_those_met_on_either_side(scenes):
 def test_a_room_nobody_could_enter_gets_its_likeliest_door():
     linked = np.array([(0, 1), (0, 2), (0, 2), (0, 3), (1, -1)], np.int32)
     p = np.array([0.9, 0.2, 0.4, 0.05, 0.3])
-    taken = only_doors(linked, p, p >= 0.5, 4, TopologyParams(only_door_p=0.15))
+    taken = doors_of_rooms(linked, p, 0.5, 4, TopologyParams(only_door_p=0.15))
     # room 2 by its better one; room 3's is too improbable; room 1 has one
     assert taken.tolist() == [True, False, True, False, False]
-    unasked = only_doors(linked, p, p >= 0.5, 4, TopologyParams(only_door_p=1.0))
+    unasked = doors_of_rooms(linked, p, 0.5, 4, TopologyParams(only_door_p=1.0))
     assert unasked.tolist() == [True, False, False, False, False]
+
+
+def test_two_rooms_have_a_second_door_only_if_it_is_surer():
+    linked = np.array([(0, 1), (0, 1), (0, 1), (0, 2), (0, -1), (0, -1)], np.int32)
+    p = np.array([0.65, 0.9, 0.55, 0.55, 0.55, 0.52])
+    taken = doors_of_rooms(linked, p, 0.5, 3, TopologyParams(second_door_p=0.6))
+    # what leads nowhere known may lead to two places
+    assert taken.tolist() == [True, True, False, True, True, True]
+    surer = doors_of_rooms(linked, p, 0.5, 3, TopologyParams(second_door_p=0.7))
+    assert surer.tolist() == [False, True, False, True, True, True]
+    unasked = doors_of_rooms(linked, p, 0.5, 3, TopologyParams(second_door_p=0.0))
+    assert unasked.all()
 
 
 def test_a_state_is_said_where_one_stands_out():

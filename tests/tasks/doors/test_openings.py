@@ -105,7 +105,7 @@ def test_a_walk_through_a_candidate_multiplies_its_odds_of_being_a_door(scenes, 
     wall = drawn(scenes, [("shut", 0.6)], seed=80)
     positions = np.array([(1.08, -1, 1.5), (1.08, 0.6, 1.5)])
     walk = Snapshots(np.arange(2.0), positions, np.eye(2, 4), np.ones(2, np.int64))
-    lax = OpeningsParams(door_p=0.0, window_p=1.0, least_p=0.0)
+    lax = OpeningsParams(door_p=0.0, window_p=1.0, least_p=0.0, door_agree=1)
 
     def surest(snapshots, params=lax):
         found = found_in(wall, unsure, params, snapshots)
@@ -115,6 +115,15 @@ def test_a_walk_through_a_candidate_multiplies_its_odds_of_being_a_door(scenes, 
     assert 0 < p < 0.99
     assert q / (1 - q) == pytest.approx(p / (1 - p) * np.exp(lax.crossing_weight), rel=1e-6)
     assert surest([walk], lax.model_copy(update={"crossing_weight": 0.0})) == p
+
+
+def test_a_door_is_as_probable_as_its_best_rectangles_are_on_average(scenes, taught):
+    unsure = fit(taught, FEATURES, CLASSES, ForestParams(trees=5, depth=2, leaf=40))
+    wall = drawn(scenes, [("shut", 0.6)], seed=80)
+    lax = OpeningsParams(door_p=0.0, window_p=1.0, least_p=0.0, door_agree=1)
+    every = lax.model_copy(update={"door_agree": 10**6})
+    surest, mean = (found_in(wall, unsure, params).confidences.max() for params in (lax, every))
+    assert 0 < mean < surest
 
 
 def test_openings_are_the_same_twice(scenes, forest):
