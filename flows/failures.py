@@ -1,11 +1,11 @@
 """What failed in a run: which stage, of which scan, and why."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from flows.summaries import read_summary, results_folder
 from storage.artifacts import Place
 from storage.runs import Run
 from storage.stages import of_run
@@ -63,11 +63,8 @@ def with_failures(
 def _skipped(store: str, run: Run) -> list[tuple[str, str]]:
     """Return the scans a run has left out, by its summary, and why."""
     asked = run.request()
-    out = asked.get("out") or f"{store}/plans/{run.building}/{run.storey}"
-    try:
-        summary = json.loads((Path(out) / "summary.json").read_text("utf-8"))
-    except (OSError, ValueError):
-        return []
-    if summary.get("run") != run.id:
+    folder = results_folder(store, run.building, run.storey, asked.get("out"))
+    summary = read_summary(folder, run.id)
+    if summary is None:
         return []
     return [(skipped["scan"], skipped["reason"]) for skipped in summary["skipped"]]

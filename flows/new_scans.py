@@ -11,12 +11,12 @@ from prefect.context import FlowRunContext
 from flows import stages
 from flows.artifacts import progress_shown
 from flows.building import with_jobs
-from flows.hooks import summary_of
 from flows.logs import event
 from flows.news import News, known_by
 from flows.params import parse_params
 from flows.request import StoreyRequest
 from flows.settings import default_jobs
+from flows.summaries import read_summary
 from storage.errors import MapSenseError
 from storage.mapped_sources import MappedSources, write_mapped_sources
 from storage.stages import reason
@@ -55,7 +55,7 @@ def map_storey_from(
         return End(False, reason(error))
     with _progress(request, len(news.sources)):
         state = with_jobs(jobs or default_jobs())(request, return_state=True)
-    summary = summary_of(request)
+    summary = read_summary(request.folder(), request.run)
     if not state.is_completed():
         return End(False, str(state.message))
     taken = MappedSources(request.run, known_by(settings), news.sources)

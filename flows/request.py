@@ -6,6 +6,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from flows.params import MapSenseParams
+from flows.summaries import results_folder
 from storage.artifacts import Place, check_name
 from storage.runs import Run, new_id, parameter_set
 
@@ -69,5 +70,4 @@ class StoreyRequest(OfStorey):
 
     def folder(self) -> Path:
         """Return the folder of the results."""
-        default = Path(self.store) / "plans" / self.building / self.storey
-        return Path(self.out) if self.out is not None else default
+        return results_folder(self.store, self.building, self.storey, self.out)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flows.request import StoreyRequest
+from flows.summaries import FILE as SUMMARY
 from storage import coverage as stored_coverage
 from storage.artifacts import Ref
 from storage.files import write_whole
@@ -148,7 +149,7 @@ def state_of(mapped: Mapped | None, skipped: list[Skipped]) -> str:
 def write_summary(request: StoreyRequest, summary: dict[str, Any]) -> None:
     """Write summary.json into the folder of the results."""
     text = json.dumps(summary, indent=1, ensure_ascii=False) + "\n"
-    write_whole(request.folder() / "summary.json", text.encode(), "summary")
+    write_whole(request.folder() / SUMMARY, text.encode(), "summary")
 
 
 def stage_costs(rows: list[StageRow]) -> dict[str, dict[str, float | int]]:

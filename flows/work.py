@@ -1,6 +1,5 @@
 """Run what the command line asks for: the store checked, Prefect served, progress shown."""
 
-import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,6 +18,7 @@ from flows.request import StoreyRequest
 from flows.server import wait_until_up
 from flows.settings import load_settings
 from flows.storey import threads
+from flows.summaries import read_summary
 from flows.training import TrainRequest, train
 from storage.catalog import Catalog
 from storage.energy import STOREY
@@ -173,12 +173,8 @@ def _outcome(request: StoreyRequest, state: Any) -> dict[str, Any]:
 def _summary(request: StoreyRequest) -> dict[str, Any]:
     """Return a run's summary, or what the store knows of one that ended without."""
     run = _recorded(request)
-    path = request.folder() / "summary.json"
-    if path.is_file():
-        summary: dict[str, Any] = json.loads(path.read_text("utf-8"))
-        if summary["run"] == request.run:
-            return summary
-    return {
+    summary = read_summary(request.folder(), request.run)
+    return summary or {
         "building": request.building,
         "storey": request.storey,
         "state": run.state if run is not None else "failed",

@@ -7,6 +7,23 @@ PARALLEL = 1e-9
 """Triple product below which three unit normals meet in no single point."""
 
 
+def unit_axes(lines: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the unit vectors from the first to the second end of plan lines.
+
+    Parameters
+    ----------
+    lines : (n, 2, 2) float
+        Ends, metres.
+
+    Returns
+    -------
+    (n, 2) float
+        Zero for a line of no length.
+    """
+    across = lines[:, 1] - lines[:, 0]
+    return across / np.maximum(np.linalg.norm(across, axis=1), 1e-12)[:, None]
+
+
 def intersect_planes(
     normals: NDArray[np.float64], offsets: NDArray[np.float64]
 ) -> NDArray[np.float64]:

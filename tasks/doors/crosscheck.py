@@ -8,6 +8,7 @@ from pydantic import Field, PositiveFloat
 from storage.candidates import Candidates
 from storage.wall_images import WallImages
 from storage.walls import Walls
+from tasks.geometry import unit_axes
 from tasks.params import Params
 
 
@@ -32,8 +33,7 @@ def on_walls(candidates: Candidates, images: WallImages, walls: Walls) -> NDArra
     """
     faces = candidates.faces
     lines = walls.lines[images.walls[faces]]
-    across = lines[:, 1] - lines[:, 0]
-    axes = across / np.maximum(np.linalg.norm(across, axis=1), 1e-12)[:, None]
+    axes = unit_axes(lines)
     origin = np.einsum("nx,nx->n", images.origins[faces] - lines[:, 0], axes)
     turn = np.einsum("nx,nx->n", images.axes[faces], axes)
     ends = origin[:, None] + turn[:, None] * np.column_stack([candidates.from_m, candidates.to_m])

@@ -35,10 +35,6 @@ class WallFaces:
     def __len__(self) -> int:
         return len(self.walls)
 
-    def normals(self) -> NDArray[np.float64]:
-        """Return the unit plan normals, (f, 2), which point into the rooms."""
-        return np.column_stack([-self.axes[:, 1], self.axes[:, 0]])
-
 
 def wall_faces(rooms: Rooms, walls: Walls) -> WallFaces:
     """Return each wall piece's face towards each of its rooms.

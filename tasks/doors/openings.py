@@ -21,6 +21,7 @@ from tasks.doors.states import StateParams, states
 from tasks.doors.topology import TopologyParams, doors_of_rooms, rooms_beside
 from tasks.doors.trajectory import TrajectoryParams, crossed, crossings, steps
 from tasks.forest import predict
+from tasks.geometry import unit_axes
 from tasks.params import Params
 
 
@@ -90,10 +91,8 @@ class _Found:
 
     def lines(self, walls: Walls) -> NDArray[np.float64]:
         """Return the ends in the plan, (n, 2, 2)."""
-        begin = walls.lines[self.walls, 0]
-        across = walls.lines[self.walls, 1] - begin
-        axes = across / np.maximum(np.linalg.norm(across, axis=1), 1e-12)[:, None]
-        return begin[:, None] + self.boxes[:, :2, None] * axes[:, None]
+        lines = walls.lines[self.walls]
+        return lines[:, :1] + self.boxes[:, :2, None] * unit_axes(lines)[:, None]
 
 
 def find_openings(

@@ -8,6 +8,7 @@ from shapely import STRtree
 
 from storage.rooms import Rooms
 from storage.walls import Walls
+from tasks.geometry import unit_axes
 from tasks.params import Params
 
 NO_ROOM = -1
@@ -43,8 +44,7 @@ def rooms_beside(
     if not len(lines):
         return np.empty((0, 2), np.int32)
     middles = lines.mean(axis=1)
-    across = lines[:, 1] - lines[:, 0]
-    axes = across / np.maximum(np.linalg.norm(across, axis=1), 1e-12)[:, None]
+    axes = unit_axes(lines)
     normals = np.column_stack([-axes[:, 1], axes[:, 0]])
     both = np.column_stack([_met(middles, side * normals, rooms, params) for side in (1.0, -1.0)])
     named = walls.rooms[on_walls]

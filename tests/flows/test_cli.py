@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flows.cli import main
 from flows.params import parse_params
 from flows.request import StoreyRequest
 from flows.settings import load_settings
@@ -26,21 +25,6 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture(scope="module")
 def cloud():
     return PointCloud(furnished_room(30_000, 1)[0], np.zeros(3))
-
-
-@pytest.fixture
-def mapsense(tmp_path, monkeypatch, capsys):
-    """Return what runs the command in an empty folder: its exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main([str(argument) for argument in arguments])
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
 
 
 @pytest.fixture

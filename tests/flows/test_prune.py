@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flows.cli import main
 from flows.params import MapSenseParams
 from flows.request import StoreyRequest
 from storage.catalog import run_query
@@ -18,21 +17,6 @@ from tasks.scans.bundle import write_bundle
 from tasks.simulation.clouds import furnished_room
 
 TABLES = ("points", "planes", "segments", "rooms", "walls", "quality")
-
-
-@pytest.fixture
-def mapsense(tmp_path, monkeypatch, capsys):
-    """Return what runs the command in an empty folder: its exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main([str(argument) for argument in arguments])
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
 
 
 @pytest.fixture

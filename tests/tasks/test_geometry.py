@@ -1,4 +1,4 @@
-"""The point common to three planes against a linear solver."""
+"""The point common to three planes against a linear solver; directions of plan lines."""
 
 import warnings
 
@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tasks.geometry import intersect_planes
+from tasks.geometry import intersect_planes, unit_axes
 
 finite = st.floats(-1, 1, allow_subnormal=False)
 
@@ -60,3 +60,8 @@ def test_a_parallel_triple_does_not_spoil_the_others():
     points = intersect_planes(normals, np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]]))
     assert points[0].tolist() == [1, 2, 3]
     assert np.isnan(points[1]).all()
+
+
+def test_axes_are_unit_and_lead_from_first_to_second_end():
+    lines = np.array([[[1.0, 2], [4, 6]], [[0, 0], [0, -3]], [[5, 5], [5, 5]]])
+    np.testing.assert_allclose(unit_axes(lines), [[0.6, 0.8], [0, -1], [0, 0]])
