@@ -171,7 +171,10 @@ def _plain(value: Any) -> str:
 
 def existing_store(store: Path | None) -> Path:
     """Return the folder of a store that is there, else raise StoreError."""
-    root = load_settings(store=store).store
+    settings = load_settings(store=store)
+    root = settings.store
+    if settings.remote is not None:
+        root.mkdir(parents=True, exist_ok=True)  # filled from there
     if not root.is_dir():
         raise StoreError(f"{root}: there is no store; name one with --store, or map a storey first")
     return root

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from grammars.library import find_grammar
 from grammars.reading import read_grammar
 from storage.plan_geojson import to_geojson, write_plan
+from storage.remote import share
 from storage.sources import Source, file_source
 from tasks.evaluation.label_files import is_labels
 from tasks.evaluation.truth import read_truth, truth_files
@@ -63,6 +64,7 @@ def true_plan(path: Path, store: str, storey: str | None = None) -> Truth:
     name = sha256(json.dumps(to_geojson(plan)).encode()).hexdigest()[:24]
     kept = Path(store) / "truths" / f"{name}{GEOJSON}"
     write_plan(plan, kept)
+    share(store, kept)
     return Truth(plan_source(kept), _labels(path) if is_labels(path) else None)
 
 

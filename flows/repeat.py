@@ -20,6 +20,7 @@ from storage.artifacts import check_name, read
 from storage.detections import DETECTIONS
 from storage.errors import InputError, MapSenseError
 from storage.files import write_whole
+from storage.remote import share
 from storage.runs import (
     COMPLETED,
     DEFAULT,
@@ -115,7 +116,7 @@ def _map_and_score(request: RepeatRequest, inputs: Inputs, record: Recorder) -> 
     message = ending(len(inputs.sources) + len(inputs.errors), skipped, mapped)
     if mapped is None:
         raise MapSenseError(message)
-    write_plans(mapped, request.folder())
+    write_plans(mapped, request.store, request.folder())
     compare_planes(request.place(), mapped.used, inputs.truth, request.params)
     scored = _score(request, inputs.truth)
     record.end(state_of(mapped, skipped), message)
@@ -129,6 +130,7 @@ def _score_initial(
     plan = (request.folder() / INITIAL).read_bytes()
     for name in (INITIAL, FINAL):
         write_whole(initial.folder() / name, plan, "plan")
+        share(request.store, initial.folder() / name)
     scored = _score(initial, truth)
     record.end(COMPLETED, "")
     return scored

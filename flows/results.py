@@ -15,6 +15,7 @@ from storage.files import write_whole
 from storage.plan import Plan
 from storage.plan_geojson import read_plan, to_geojson, write_plan
 from storage.quality import Quality
+from storage.remote import share
 from storage.runs import COMPLETED, FAILED, PARTIAL
 from storage.scans import Scan
 from storage.stages import StageRow, of_run
@@ -84,16 +85,19 @@ class Mapped:
 def write_results(request: StoreyRequest, mapped: Mapped) -> None:
     """Write the plan and its drawings, each whole or not at all."""
     folder = request.folder()
-    write_plans(mapped, folder)
+    write_plans(mapped, request.store, folder)
     seen = mapped.coverage
     drawn = Coverage(seen.centres(), seen.cell_m, seen.scans)
-    draw_plan(mapped.plan, drawn, folder / "plan.svg", folder / "plan.png")
+    drawings = (folder / "plan.svg", folder / "plan.png")
+    draw_plan(mapped.plan, drawn, *drawings)
+    share(request.store, *drawings)
 
 
-def write_plans(mapped: Mapped, folder: Path) -> None:
+def write_plans(mapped: Mapped, store: str, folder: Path) -> None:
     """Write the initial and the final model, each whole or not at all."""
     write_plan(mapped.initial, folder / INITIAL)
     write_plan(mapped.plan, folder / FINAL)
+    share(store, folder / INITIAL, folder / FINAL)
 
 
 def is_corrected(initial: Path, final: Path) -> bool:
@@ -150,6 +154,7 @@ def write_summary(request: StoreyRequest, summary: dict[str, Any]) -> None:
     """Write summary.json into the folder of the results."""
     text = json.dumps(summary, indent=1, ensure_ascii=False) + "\n"
     write_whole(request.folder() / SUMMARY, text.encode(), "summary")
+    share(request.store, request.folder() / SUMMARY)
 
 
 def stage_costs(rows: list[StageRow]) -> dict[str, dict[str, float | int]]:

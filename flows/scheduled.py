@@ -23,6 +23,7 @@ from flows.news import News, find_news
 from storage.artifacts import check_name
 from storage.errors import MapSenseError
 from storage.mapped_sources import read_mapped_sources
+from storage.remote import refresh
 from storage.stages import reason
 
 FORM = "MAPSENSE_LOG"
@@ -117,6 +118,7 @@ def _look(
 
 def _is_worth_a_run(news: News, building: str, storey: str, store: str) -> bool:
     """Return whether a storey is to be mapped; also if its results were taken away."""
+    refresh(store, f"plans/{building}/{storey}")
     is_lost = not (Path(store) / "plans" / building / storey).is_dir()
     return news.is_worth_a_run() or (is_lost and bool(news.sources))
 

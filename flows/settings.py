@@ -10,12 +10,13 @@ The same from the environment: MAPSENSE_STORE=/data/mapsense, MAPSENSE_PARAMS__H
 """
 
 import os
+import re
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, field_validator
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -26,10 +27,11 @@ from pydantic_settings import (
 
 from storage.errors import MapSenseError
 
+ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*://[^@?#]+")
 FILE = "mapsense.toml"
 PREFIX = "MAPSENSE_"
-OF_PROCESSES = ("stage_timeout_s", "stage_memory_mb")
-"""Settings that stages take from the environment of the process they run in."""
+OF_PROCESSES = ("stage_timeout_s", "stage_memory_mb", "dask", "remote")
+"""Settings that are taken from the environment of the process stages are run by."""
 
 
 def default_jobs() -> int:
@@ -53,6 +55,10 @@ class Settings(BaseSettings):
     """Folder of everything that is kept."""
     jobs: PositiveInt = Field(default_factory=default_jobs)
     """Stages that run at once."""
+    remote: str | None = None
+    """Address, such as s3://bucket/prefix, that the store shares all it holds with."""
+    dask: str | None = None
+    """Address of the Dask scheduler whose workers run the stages. Not set: threads, here."""
     stage_timeout_s: PositiveFloat | None = None
     """Seconds after which a stage is stopped, its scan skipped. Not set: never."""
     stage_memory_mb: PositiveInt | None = None
@@ -61,6 +67,13 @@ class Settings(BaseSettings):
     """Whether each event of a run is written on stderr, and as what: for runs nobody watches."""
     params: dict[str, Any] = {}
     """Parameters of the stages, by stage: what flags and defaults leave open."""
+
+    @field_validator("remote")
+    @classmethod
+    def _is_an_address(cls, value: str | None) -> str | None:
+        if value is not None and not ADDRESS.fullmatch(value):
+            raise ValueError("Expected an address without credentials, as s3://bucket/prefix")
+        return value
 
     @classmethod
     def settings_customise_sources(

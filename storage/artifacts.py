@@ -19,10 +19,13 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, field_validator
 
 from storage.errors import DamagedArtifact, StoreError
+from storage.remote import obtain, share
 
 T = TypeVar("T")
 
 SCHEMA_VERSION = "1"
+CACHE = ".cache"
+"""Folder of a store's cache records: which artifacts a key led to."""
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
 """What a building, storey or scan may be called: it becomes a folder."""
 
@@ -129,6 +132,7 @@ def write(kind: Kind[T], value: T, place: Place) -> Ref:
         digest = _hash(temporary)
         uri = f"{folder}/{digest[:24]}.parquet"
         os.replace(temporary, Path(place.store) / uri)
+    share(place.store, Path(place.store) / uri)
     return Ref(uri=uri, sha256=digest, rows=table.num_rows, table=kind.table)
 
 
@@ -167,8 +171,12 @@ def read(kind: Kind[T], ref: Ref, store: Path | str) -> T:
 
 
 def check(ref: Ref, store: Path | str) -> None:
-    """Raise DamagedArtifact unless the artifact is there and its bytes are the ones named."""
+    """Raise DamagedArtifact unless the artifact is there and its bytes are the ones named.
+
+    One that the store lacks is taken from the address it is shared at.
+    """
     path = Path(store) / ref.uri
+    obtain(store, ref.uri)
     try:
         found = _hash(path)
     except OSError as error:

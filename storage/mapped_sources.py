@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from storage.artifacts import column, replace_table, schema
 from storage.errors import StoreError
+from storage.remote import refresh, share
 from storage.stages import reason
 
 TABLE = "sources"
@@ -55,7 +56,9 @@ def write_mapped_sources(store: str, building: str, storey: str, mapped: MappedS
     """Write what a run took, in place of what the one before took."""
     about = {"run": mapped.run, "settings": mapped.settings}
     rows = [about | asdict(source) for source in mapped.sources]
-    replace_table(_path(store, building, storey), pa.Table.from_pylist(rows, SCHEMA))
+    path = _path(store, building, storey)
+    replace_table(path, pa.Table.from_pylist(rows, SCHEMA))
+    share(store, path)
 
 
 def read_mapped_sources(store: str, building: str, storey: str) -> MappedSources | None:
@@ -67,6 +70,7 @@ def read_mapped_sources(store: str, building: str, storey: str) -> MappedSources
         If the file is none of ours.
     """
     path = _path(store, building, storey)
+    refresh(store, path.parent.relative_to(store).as_posix())
     try:
         rows = pq.read_table(path, partitioning=None).select(SCHEMA.names).to_pylist()
     except FileNotFoundError:

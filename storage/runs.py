@@ -15,7 +15,9 @@ import pyarrow.parquet as pq
 
 from storage.artifacts import Place, check_name, column, replace_table, schema
 from storage.errors import StoreError
+from storage.leases import is_leased, leased, wait_for
 from storage.locks import FOLDER, held, is_held
+from storage.remote import refresh, share
 from storage.stages import reason
 
 RUNNING, COMPLETED, PARTIAL, FAILED = "running", "completed", "partial", "failed"
@@ -119,10 +121,15 @@ def recorded(store: str, run: Run) -> Iterator[Recorder]:
 
     While it goes on, the run holds a lock that its death drops: so others can tell a run that
     goes on from one that was killed. And it shares the lock of its storey: so nothing is pruned
-    there meanwhile.
+    there meanwhile. Its lease tells both to other machines.
     """
     lock = _lock(store, run.id)
-    with held(storey_lock(store, run.building, run.storey), shared=True), held(lock):
+    with (
+        held(storey_lock(store, run.building, run.storey), shared=True),
+        held(lock),
+        leased(_lease(run)),
+    ):
+        wait_for(pruning_lease(run.building, run.storey))
         recorder = Recorder(run)
         try:
             _write(store, run)
@@ -137,13 +144,14 @@ def recorded(store: str, run: Run) -> Iterator[Recorder]:
 
 def goes_on(store: str, run: Run) -> bool:
     """Return whether the process of a run is still at it."""
-    return run.state == RUNNING and is_held(_lock(store, run.id))
+    return run.state == RUNNING and (is_held(_lock(store, run.id)) or is_leased(_lease(run)))
 
 
 def read_runs(
     store: Path | str, building: str | None = None, storey: str | None = None
 ) -> list[Run]:
     """Return the runs of a store, or of one building or storey of it, by their start."""
+    refresh(store, "/".join(("runs", *_folders(building, storey))))
     pattern = f"runs/building={building or '*'}/storey={storey or '*'}/*.parquet"
     runs = []
     for path in Path(store).glob(pattern):
@@ -175,12 +183,34 @@ def _write(store: str, run: Run) -> None:
     row = {name: value for name, value in asdict(run).items() if name in SCHEMA.names}
     path = Path(store) / place.folder("runs") / f"{run.id}.parquet"
     replace_table(path, pa.Table.from_pylist([row], SCHEMA))
+    share(store, path)
 
 
 def storey_lock(store: Path | str, building: str, storey: str) -> Path:
     """Return the lock file of a storey: shared by runs that go on, alone for who prunes."""
     name = sha256(f"{building}/{storey}".encode()).hexdigest()[:32]
     return Path(store) / FOLDER / f"storey-{name}.lock"
+
+
+def runs_lease(building: str, storey: str) -> str:
+    """Return what the leases of a storey's runs are below."""
+    return f"{building}/{storey}/run"
+
+
+def pruning_lease(building: str, storey: str) -> str:
+    """Return the lease of who prunes a storey."""
+    return f"{building}/{storey}/pruning"
+
+
+def _lease(run: Run) -> str:
+    return f"{runs_lease(run.building, run.storey)}/{run.id}"
+
+
+def _folders(building: str | None, storey: str | None) -> list[str]:
+    """Return the folders that what is asked for lies in, as far as they are known."""
+    if building is None:
+        return []
+    return [f"building={building}", *([f"storey={storey}"] if storey is not None else [])]
 
 
 def _lock(store: str, run: str) -> Path:

@@ -1,15 +1,18 @@
 """What each run of a stage cost, and how it ended: one row per stage and run, cached ones too.
 
-Each process keeps one file per flow run and storey and writes it anew with each row, atomically:
-a killed run loses no row of a stage that had ended, a reader never meets a row twice, and there
-are as many files as runs, not as rows.
+Each process keeps a file per flow run and storey and writes it anew with each row, atomically: a
+killed run loses no row of a stage that had ended, a reader never meets a row twice, and files are
+far fewer than rows. A file that is full is followed by another, so that a row costs the same
+however many came before it.
 """
 
 import os
+import socket
 import threading
 from collections import defaultdict
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from datetime import datetime
+from hashlib import sha256
 from pathlib import Path
 
 import pyarrow as pa
@@ -17,6 +20,7 @@ import pyarrow.parquet as pq
 
 from storage.artifacts import Place, column, replace_table, schema
 from storage.errors import MapSenseError
+from storage.remote import refresh, share
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,22 @@ SCHEMA = schema(
     ],
 )
 
-_written: dict[tuple[str, str, str], list[StageRow]] = defaultdict(list)
+FULL_ROWS = 256
+"""Rows of a file that is followed by another."""
+
+
+@dataclass
+class _Written:
+    """What this process has written of a run."""
+
+    rows: list[StageRow] = field(default_factory=list)
+    writing: threading.Lock = field(default_factory=threading.Lock)
+    sharing: threading.Lock = field(default_factory=threading.Lock)
+    shared: dict[Path, int] = field(default_factory=dict)
+    """rows there were when a file was put where others see it"""
+
+
+_written: dict[tuple[str, str, str], _Written] = defaultdict(_Written)
 _mutex = threading.Lock()
 
 
@@ -77,16 +96,26 @@ def append(place: Place, row: StageRow) -> None:
     """Add a row to the file this process keeps for the place's run and storey."""
     folder = place.model_copy(update={"scan": None}).folder("stages")
     with _mutex:
-        rows = _written[place.store, folder, place.run]
-        rows.append(row)
-        # the process id: a run's stages may be spread over several processes
-        path = Path(place.store) / folder / f"{place.run}-{os.getpid()}.parquet"
-        replace_table(path, to_table(rows))
+        written = _written[place.store, folder, place.run]
+    with written.writing:
+        written.rows.append(row)
+        count = len(written.rows)
+        full = (count - 1) // FULL_ROWS
+        path = Path(place.store) / folder / f"{place.run}-{_process()}.{full:04d}.parquet"
+        replace_table(path, to_table(written.rows[full * FULL_ROWS :]))
+    with written.sharing:
+        if written.shared.get(path, 0) < count:
+            with written.writing:
+                count = len(written.rows)  # those that others wrote meanwhile go with it
+            share(place.store, path)
+            written.shared[path] = count
 
 
 def of_run(place: Place) -> list[StageRow]:
     """Return the rows of one run of a storey, in the order they ended in."""
-    folder = Path(place.store) / place.model_copy(update={"scan": None}).folder("stages")
+    uri = place.model_copy(update={"scan": None}).folder("stages")
+    refresh(place.store, uri)
+    folder = Path(place.store) / uri
     files = sorted(folder.glob(f"{place.run}-*.parquet"))
     return [row for file in files for row in from_table(pq.read_table(file, partitioning=None))]
 
@@ -96,6 +125,11 @@ def forget(place: Place) -> None:
     folder = place.model_copy(update={"scan": None}).folder("stages")
     with _mutex:
         _written.pop((place.store, folder, place.run), None)
+
+
+def _process() -> str:
+    """Return a name of this process: a run's stages may be spread over several, on any machine."""
+    return f"{sha256(socket.gethostname().encode()).hexdigest()[:6]}{os.getpid()}"
 
 
 def reason(error: BaseException) -> str:

@@ -27,14 +27,20 @@ def find(store: Path, table: str) -> dict[str, Stamp]:
     return dict(sorted(_walk(f"{store}/{table}", table)))
 
 
-def stamps(store: Path, table: str, uris: Iterable[str]) -> dict[str, Stamp]:
-    """Return those of the files named that are there and could be the table's."""
+def is_of(table: str, uri: str) -> bool:
+    """Return whether a file could be the table's.
+
+    Rows of a history may be anybody's: they must not lead out of the table's folder.
+    """
+    return uri.endswith(".parquet") and uri.startswith(f"{table}/") and ".." not in uri.split("/")
+
+
+def stamps(store: Path, uris: Iterable[str]) -> dict[str, Stamp]:
+    """Return those of the files named that are there."""
     found = {}
     for uri in sorted(uris):
-        # rows of a history may be anybody's: they must not lead out of the table's folder
-        if uri.endswith(".parquet") and uri.startswith(f"{table}/") and ".." not in uri.split("/"):
-            with suppress(OSError):
-                found[uri] = _stamp(os.stat(f"{store}/{uri}"))
+        with suppress(OSError):
+            found[uri] = _stamp(os.stat(f"{store}/{uri}"))
     return found
 
 

@@ -21,7 +21,8 @@ from storage import packs, runs, stages
 from storage.artifacts import Kind
 from storage.errors import StoreError
 from storage.read_only import ReadOnlyFiles, url
-from storage.table_files import PARTITIONS, Stamp, find, place, problem, stamps
+from storage.remote import obtain_all, refresh
+from storage.table_files import PARTITIONS, Stamp, find, is_of, place, problem, stamps
 
 HISTORIES = {"runs": runs.SCHEMA, "stages": stages.SCHEMA}
 PARAMETERS = "parameters"
@@ -158,6 +159,7 @@ class Views:
         schema = HISTORIES[table]
         if table == "stages":
             self._make("runs")  # first: of a run that has ended there all stages are there
+        refresh(self.store, table)
         known = find(self.store, table)
         inside = self._packed(table, schema, known)
         left = [uri for uri in known if uri not in inside]
@@ -174,13 +176,16 @@ class Views:
         every = name != kind.table
         listing = self._listing(every)
         if every:
+            refresh(self.store, kind.table)
             known = find(self.store, kind.table)
         else:
             named = self.connection.execute(
                 f"select distinct uri from {listing} where starts_with(uri, $start)",
                 {"start": f"{kind.table}/"},
             ).fetchall()
-            known = stamps(self.store, kind.table, (uri for (uri,) in named))
+            uris = [uri for (uri,) in named if is_of(kind.table, uri)]
+            obtain_all(self.store, uris)
+            known = stamps(self.store, uris)
         inside = self._packed(kind.table, kind.schema, known)
         left = [uri for uri in known if uri not in inside]
         sound = self._sound(left, kind.table, kind.schema)

@@ -56,3 +56,18 @@ def prefect_server(tmp_path_factory: pytest.TempPathFactory, prefect_home: Path)
         utilities.prefect_test_harness(server_startup_timeout=120),
     ):
         yield PREFECT_API_URL.value()
+
+
+@pytest.fixture
+def address(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """An address in memory that every store shares meanwhile: stores are as on several machines."""
+    import fsspec
+
+    from storage.remote import REMOTE
+
+    url = "memory://bucket/prefix"
+    monkeypatch.setenv(REMOTE, url)
+    memory = fsspec.filesystem("memory")
+    yield url
+    memory.store.clear()
+    memory.pseudo_dirs[:] = [""]

@@ -16,6 +16,7 @@ from storage.artifacts import check_name
 from storage.catalog import Catalog
 from storage.errors import MapSenseError, StoreError
 from storage.files import write_whole
+from storage.remote import refresh
 from tasks.exports.report import Report, Section, render_report
 
 PAGE, FIGURES = "report.html", "figures"
@@ -47,6 +48,7 @@ def write_report(store: Path, out: Path, building: str | None = None) -> Path:
     MapSenseError
         If nothing of the building is in the store.
     """
+    refresh(store, "runs")
     if not (store / "runs").is_dir():
         raise StoreError(f"{store}: is no store (it has no folder runs); name one with --store")
     answers = ask(store, building)

@@ -11,6 +11,7 @@ from flows.results import FINAL, INITIAL, is_corrected
 from storage.errors import InputError
 from storage.plan import Plan
 from storage.plan_geojson import read_plan
+from storage.remote import obtain
 from tasks.evaluation.truth import read_truth
 from tasks.exports.figures.canvas import Picture
 from tasks.exports.figures.plans import Panel, draw_plans
@@ -109,7 +110,11 @@ def _paths(store: Path, row: Row) -> tuple[Path, Path]:
     before = Path(asked.get("store") or store)
     if truth.is_relative_to(before):
         truth = store / truth.relative_to(before)
-    return plan if asked.get("plan") else kept, truth
+        obtain(store, truth.relative_to(store).as_posix())
+    if asked.get("plan"):
+        return plan, truth
+    obtain(store, kept.relative_to(store).as_posix())
+    return kept, truth
 
 
 def _models(variant: str, path: Path) -> list[tuple[str, Path]]:

@@ -30,15 +30,19 @@ class FlockLockManager(LockManager):
     on_locked : callable
         Called with the key each time a lock was taken, before the cache is looked at: what it
         finds and does, no other holder of the key can disturb.
+    on_release : callable
+        Called with the key before its lock is given back: a record that was made is there.
     """
 
-    def __init__(self, folder: Path, on_locked: Callable[[str], None]) -> None:
-        self._folder, self._on_locked = folder, on_locked
+    def __init__(
+        self, folder: Path, on_locked: Callable[[str], None], on_release: Callable[[str], None]
+    ) -> None:
+        self._folder, self._on_locked, self._on_release = folder, on_locked, on_release
         self._held: dict[str, tuple[str, int]] = {}  # key -> (holder, descriptor)
         self._mutex = threading.Lock()
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:  # process runners pickle it
-        return FlockLockManager, (self._folder, self._on_locked)
+        return FlockLockManager, (self._folder, self._on_locked, self._on_release)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "FlockLockManager":
         return self
@@ -58,7 +62,7 @@ class FlockLockManager(LockManager):
         try:
             self._on_locked(key)
         except BaseException:
-            self.release_lock(key, holder)
+            self._drop(key)
             raise
         return True
 
@@ -66,8 +70,10 @@ class FlockLockManager(LockManager):
         """Give a lock back."""
         if not self.is_lock_holder(key, holder):
             raise ValueError(f"no lock held by {holder} for key {key}")
-        with self._mutex:
-            os.close(self._held.pop(key)[1])  # closing unlocks
+        try:
+            self._on_release(key)
+        finally:
+            self._drop(key)
 
     def is_locked(self, key: str) -> bool:
         """Return whether anyone holds a key's lock."""
@@ -97,6 +103,10 @@ class FlockLockManager(LockManager):
     async def await_for_lock(self, key: str, timeout: float | None = None) -> bool:
         """Wait until a key's lock is free."""
         return await anyio.to_thread.run_sync(self.wait_for_lock, key, timeout)
+
+    def _drop(self, key: str) -> None:
+        with self._mutex:
+            os.close(self._held.pop(key)[1])  # closing unlocks
 
     def _take(self, key: str, holder: str) -> bool:
         if (descriptor := self._try(key)) is None:

@@ -65,7 +65,9 @@ def policy_for(store: str, stage: str, fn: Any, signature: StageSignature) -> St
     return StagePolicy(
         isolation_level=IsolationLevel.SERIALIZABLE,
         lock_manager=FlockLockManager(
-            Path(store) / FOLDER, partial(records.drop_unless_sound, store)
+            Path(store) / FOLDER,
+            partial(records.drop_unless_sound, store),
+            partial(records.hand_on, store),
         ),
         stage=stage,
         fn=fn,

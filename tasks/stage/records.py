@@ -11,7 +11,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from storage.artifacts import Ref, check_name, is_sound
+from storage.artifacts import CACHE, Ref, check_name, is_sound
+from storage.errors import StoreError
+from storage.remote import is_held, obtain, share
 
 REF = f"{Ref.__module__}.{Ref.__qualname__}"
 SERIALIZER = {
@@ -25,18 +27,33 @@ SERIALIZER = {
 
 def folder(store: str) -> Path:
     """Return where a store keeps its cache records: the path below it is the key."""
-    return Path(store) / ".cache"
+    return Path(store) / CACHE
 
 
 def drop_unless_sound(store: str, key: str) -> None:
     """Drop the record of a key if it, or any artifact it names, is missing or damaged.
 
-    Called while the key is locked, so that a hit is always whole: what is dropped is a miss.
+    Called while the key is locked, so that a hit is always whole: what is dropped is a miss. A
+    record that another machine made is taken from the address it shares; its artifacts stay there
+    until somebody reads them.
     """
+    with contextlib.suppress(StoreError):  # not to be reached: computed anew
+        obtain(store, f"{CACHE}/{key}")
     path = folder(store) / key
     if path.is_file() and not _is_sound(path, key, store):
         with contextlib.suppress(FileNotFoundError):
             path.unlink()
+
+
+def hand_on(store: str, key: str) -> None:
+    """Put the record of a key where other machines find it, if there is one.
+
+    It comes after the artifacts it names. One that cannot be put is missing there: another machine
+    computes the stage itself.
+    """
+    path = folder(store) / key
+    with contextlib.suppress(StoreError, FileNotFoundError):
+        share(store, path)
 
 
 def _is_sound(path: Path, key: str, store: str) -> bool:
@@ -45,7 +62,14 @@ def _is_sound(path: Path, key: str, store: str) -> bool:
         named = all(ref.uri == _uri(key, ref) for ref in refs)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return False  # cut, another version's, or nobody's
-    return bool(refs) and named and all(is_sound(ref, store) for ref in refs)
+    return bool(refs) and named and all(_is_there(ref, store) for ref in refs)
+
+
+def _is_there(ref: Ref, store: str) -> bool:
+    try:
+        return is_held(store, ref.uri) or is_sound(ref, store)
+    except StoreError:
+        return False
 
 
 def read_refs(record: bytes) -> list[Ref]:

@@ -11,13 +11,17 @@ from tasks.stage.locks import FlockLockManager
 from tasks.stage.meter import metered
 
 
+def nothing(key: str) -> None:
+    """Do nothing with a key."""
+
+
 @pytest.fixture
 def locks(tmp_path):
-    return FlockLockManager(tmp_path, lambda key: None)
+    return FlockLockManager(tmp_path, nothing, nothing)
 
 
 def test_a_key_has_one_holder(locks, tmp_path):
-    other = FlockLockManager(tmp_path, lambda key: None)
+    other = FlockLockManager(tmp_path, nothing, nothing)
     assert locks.acquire_lock("a/b", "me")
     assert locks.is_lock_holder("a/b", "me")
     assert other.is_locked("a/b")
@@ -35,7 +39,7 @@ def test_only_its_holder_gives_a_lock_back(locks):
 
 def test_who_waits_gets_the_lock_when_it_is_given_back(locks, tmp_path):
     locks.acquire_lock("key", "me")
-    other = FlockLockManager(tmp_path, lambda key: None)
+    other = FlockLockManager(tmp_path, nothing, nothing)
     threading.Timer(0.1, locks.release_lock, ("key", "me")).start()
     assert other.acquire_lock("key", "you", acquire_timeout=5)
 
@@ -43,7 +47,7 @@ def test_who_waits_gets_the_lock_when_it_is_given_back(locks, tmp_path):
 def test_a_killed_holder_holds_nothing(locks, tmp_path):
     code = (
         "import os, sys; from pathlib import Path; from tasks.stage.locks import FlockLockManager\n"
-        "FlockLockManager(Path(sys.argv[1]), print).acquire_lock('key', 'it')\n"
+        "FlockLockManager(Path(sys.argv[1]), print, print).acquire_lock('key', 'it')\n"
         "os.kill(os.getpid(), 9)"
     )
     killed = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True)
@@ -53,16 +57,34 @@ def test_a_killed_holder_holds_nothing(locks, tmp_path):
 
 def test_what_is_done_at_locking_is_done_under_the_lock(tmp_path):
     seen = []
-    locks = FlockLockManager(tmp_path, lambda key: seen.append((key, locks.is_locked(key))))
+
+    def see(key: str) -> None:
+        seen.append((key, locks.is_locked(key)))
+
+    locks = FlockLockManager(tmp_path, see, see)
     locks.acquire_lock("key", "me")
     assert seen == [("key", True)]
+    locks.release_lock("key", "me")
+    assert seen == [("key", True)] * 2
+    assert not locks.is_locked("key")
+
+
+def test_a_failure_at_giving_back_gives_the_lock_back(tmp_path):
+    def fail(key: str) -> None:
+        raise OSError("no")
+
+    locks = FlockLockManager(tmp_path, nothing, fail)
+    locks.acquire_lock("key", "me")
+    with pytest.raises(OSError, match="no"):
+        locks.release_lock("key", "me")
+    assert not locks.is_locked("key")
 
 
 def test_a_failure_at_locking_gives_the_lock_back(tmp_path):
     def fail(key: str) -> None:
         raise OSError("no")
 
-    locks = FlockLockManager(tmp_path, fail)
+    locks = FlockLockManager(tmp_path, fail, nothing)
     with pytest.raises(OSError, match="no"):
         locks.acquire_lock("key", "me")
     assert not locks.is_locked("key")
