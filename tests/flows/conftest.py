@@ -2,19 +2,11 @@
 
 import pytest
 
-from flows.cli import main
+from tests.flows import command
 
 
 @pytest.fixture
-def mapsense(tmp_path, monkeypatch, capsys):
+def mapsense(tmp_path, monkeypatch):
     """Return what runs the command in an empty folder: its exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main([str(argument) for argument in arguments])
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
+    return command.mapsense

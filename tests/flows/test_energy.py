@@ -1,19 +1,18 @@
 """A tiny campaign by the command line: simulated, charged, charged again, with a scan broken."""
 
 import json
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from io import StringIO
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from shapely import LineString, box
 
-from flows.cli import main
 from flows.work import ENERGY_ANSWERS
 from storage.catalog import run_query
 from storage.plan import Plan, PlanRoom, PlanWall
 from storage.plan_geojson import write_plan
 from storage.runs import read_runs
+from tests.flows.command import mapsense
 
 SIMULATED = (
     *("--set", "campaign.sensor.rays=1500"),
@@ -34,14 +33,6 @@ PER_SCAN = {
 WHOLE = {"scan_work", "energy", "savings", "energy_sweep", "energy_targets"}
 WATTS = (283.17 * 20 + 132.86) / 1000
 """Of Wi-Fi at 20 Mbit/s (Huang et al. 2012)."""
-
-
-def mapsense(*arguments):
-    """Run the command; return its exit code, stdout and stderr."""
-    out, err = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    return left.value.code, out.getvalue(), err.getvalue()
 
 
 def strict(text):

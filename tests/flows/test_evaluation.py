@@ -1,28 +1,18 @@
 """A plan scored against its truth by the command line."""
 
 import json
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 
 import pytest
 from shapely import LineString, box
 
-from flows.cli import main
 from flows.params import MapSenseParams
 from storage.catalog import run_query
 from storage.plan import Plan, PlanRoom, PlanWall
 from storage.plan_geojson import read_plan, write_plan
 from storage.runs import last_runs, parameter_set, read_runs
+from tests.flows.command import mapsense
 
 SUFFIXES = ("geojson", "json")
-
-
-def mapsense(*arguments):
-    """Run the command; return its exit code, stdout and stderr."""
-    out, err = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    return left.value.code, out.getvalue(), err.getvalue()
 
 
 def plan_of(*rooms):

@@ -1,16 +1,13 @@
 """Variants and seeds compared by the command line, on rooms of two small campaigns."""
 
 import json
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from shapely import affinity, box
 
-from flows.cli import main
 from flows.params import MapSenseParams
 from flows.seeds import seeded, seeds_in, stage_seed
 from storage.campaign import Campaign, CampaignScan, CampaignStorey, write_campaign
@@ -22,6 +19,7 @@ from storage.runs import EVALUATE, parameter_set, read_runs
 from storage.snapshots import none
 from tasks.scans.bundle import write_bundle
 from tasks.simulation.clouds import SHIFT_M, YAW_RAD, furnished_room
+from tests.flows.command import mapsense
 
 ROOM = affinity.translate(
     affinity.rotate(box(0, 0, 6, 5), YAW_RAD, origin=(0, 0), use_radians=True), *SHIFT_M[:2]
@@ -35,14 +33,6 @@ seeds = [0, 3]
 [variants.coarse.filter]
 cell_m = 0.12
 """
-
-
-def mapsense(*arguments):
-    """Run the command; return its exit code, stdout and stderr."""
-    out, err = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    return left.value.code, out.getvalue(), err.getvalue()
 
 
 def truth_of(building, polygon=ROOM):
@@ -260,7 +250,7 @@ def test_the_initial_model_is_a_variant_of_its_own_where_the_final_one_differs(
 ):
     from flows import repeat
 
-    def refined(mapped, into):
+    def refined(mapped, store, into):
         write_plan(mapped.plan, into / "initial.geojson")
         write_plan(truth_of("hut"), into / "plan.geojson")
 

@@ -1,15 +1,12 @@
 """A storey mapped with a grammar, by the command line; grammars learnt, shown and checked."""
 
 import json
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flows.cli import main
 from grammars.reading import read_grammar
 from storage.catalog import run_query
 from storage.plan_geojson import read_plan, to_geojson, write_plan
@@ -19,6 +16,7 @@ from tasks.scans.bundle import write_bundle
 from tasks.simulation.layouts.double_loaded import DoubleLoadedParams
 from tasks.simulation.mesh import storey_mesh
 from tasks.simulation.plan import StoreyParams, make_storey
+from tests.flows.command import mapsense
 
 OBJECTS = {
     *("wall_images", "opening_candidates", "openings"),
@@ -26,14 +24,6 @@ OBJECTS = {
 }
 """The stages that look into the final plan."""
 LAYOUT = {"observations", "layout", "layout_rooms", "layout_walls"}
-
-
-def mapsense(*arguments):
-    """Run the command; return its exit code, stdout and stderr."""
-    out, err = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    return left.value.code, out.getvalue(), err.getvalue()
 
 
 def storey(name, seed):

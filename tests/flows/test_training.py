@@ -1,14 +1,11 @@
 """A classifier trained by the command line on two tiny storeys, through Prefect's real engine."""
 
 import json
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
-from io import StringIO
 
 import numpy as np
 import pytest
 
-from flows.cli import main
 from flows.disjoint import check_disjoint
 from flows.forests import forest_source
 from flows.learners import Learner
@@ -26,6 +23,7 @@ from tasks.simulation.plan import StoreyParams
 from tasks.simulation.sensor import SensorParams
 from tasks.simulation.training import FurnishedStorey
 from tasks.simulation.volunteers import VolunteerParams
+from tests.flows.command import mapsense
 
 FEATURES, CLASSES = ("area_m2", "corners"), ("room", "door")
 
@@ -58,14 +56,6 @@ def of_truth(storey, params):
 
 
 LEARNER = Learner(FEATURES, CLASSES, ForestParams(trees=4, seed=3), of_truth, nothing_more)
-
-
-def mapsense(*arguments):
-    """Run the command; return its exit code, stdout and stderr."""
-    out, err = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    return left.value.code, out.getvalue(), err.getvalue()
 
 
 @pytest.fixture(scope="module")
