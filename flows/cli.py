@@ -10,7 +10,7 @@ from cyclopts import App, CycloptsError
 
 from flows.commands import asking, grammars, mapping, simulating
 from flows.server import quiet
-from storage.errors import MapSenseError
+from storage.errors import MapSenseError, redacted
 
 
 def _version() -> str:
@@ -78,4 +78,4 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _sentence(error: Exception) -> str:
-    return " ".join(str(error).split())
+    return redacted(" ".join(str(error).split()))

@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from storage.artifacts import Place, column, replace_table, schema
-from storage.errors import MapSenseError
+from storage.errors import MapSenseError, redacted
 from storage.remote import refresh, share
 
 
@@ -134,7 +134,7 @@ def _process() -> str:
 
 def reason(error: BaseException) -> str:
     """Return why something failed, in one line: what is not meant for people, with its type."""
-    line = (str(error).splitlines() or [""])[0]
+    line = redacted((str(error).splitlines() or [""])[0])
     if isinstance(error, MapSenseError):
         return line
     return f"{type(error).__name__}: {line}" if line else type(error).__name__

@@ -13,6 +13,7 @@ from flows.request import StoreyRequest
 from flows.server import SETTINGS
 from storage.artifacts import Place, write
 from storage.catalog import run_query
+from storage.errors import MapSenseError, StoreError
 from storage.points import POINTS, PointCloud
 from storage.runs import Run, recorded
 from storage.snapshots import none
@@ -142,3 +143,58 @@ def test_values_are_bound_whatever_they_say(tmp_path):
     hostile = "' or 1 = 1; drop view points; --"
     sql = "select count(*) as n from runs where building = $building"
     assert run_query(tmp_path, sql, {"building": hostile}).to_pylist() == [{"n": 0}]
+
+
+SECRETS = {
+    "AWS_SECRET_ACCESS_KEY": "Qx81-secret",
+    "AWS_SESSION_TOKEN": "tok-991",
+    "DB_PASSWORD": "pw-4711",
+}
+
+
+@pytest.fixture
+def leaking(tmp_path, address, monkeypatch):
+    """An address whose client quotes every secret of the environment in its errors."""
+    from fsspec.implementations.memory import MemoryFileSystem
+
+    for name, value in SECRETS.items():
+        monkeypatch.setenv(name, value)
+
+    def refuse(*args, **kwargs):
+        quoted = ", ".join(SECRETS.values())
+        raise PermissionError(f"403 for https://user:hunter2@host/x with {quoted}")
+
+    monkeypatch.setattr(MemoryFileSystem, "put_file", refuse)
+
+
+def test_secrets_of_the_environment_reach_no_error_row_or_summary(tmp_path, leaking):
+    from storage.stages import reason
+
+    place = Place(store=str(tmp_path), run="r", building="b", storey="0")
+    with pytest.raises(StoreError, match="403") as failed:
+        write(POINTS, PointCloud(np.ones((1, 3)), np.zeros(3)), place)
+    texts = [str(failed.value), reason(failed.value), reason(failed.value.__cause__)]
+    assert all("403" in text and "***" in text for text in texts)
+    assert not [s for s in (*SECRETS.values(), "hunter2") for text in texts if s in text]
+
+
+def test_secrets_reach_no_file_of_a_store(tmp_path, monkeypatch):
+    for name, value in SECRETS.items():
+        monkeypatch.setenv(name, value)
+    run = Run("r", "map", "b", "0", "{}", datetime.now(UTC))
+    with pytest.raises(ValueError, match="refused"), recorded(str(tmp_path), run):
+        raise ValueError(f"refused with {' '.join(SECRETS.values())}")
+    told = run_query(tmp_path, "select message from runs")["message"].to_pylist()
+    assert told == ["ValueError: refused with *** *** ***"]
+    kept = b"".join(path.read_bytes() for path in tmp_path.rglob("*") if path.is_file())
+    assert not [secret for secret in SECRETS.values() if secret.encode() in kept]
+
+
+@pytest.mark.parametrize("url", ["s3://key:secret@bucket/x", "s3://bucket/x?token=1", "bucket/x"])
+def test_an_address_with_credentials_is_no_setting(monkeypatch, url):
+    from flows.settings import load_settings
+
+    monkeypatch.setenv("MAPSENSE_REMOTE", url)
+    with pytest.raises(MapSenseError, match=r"'remote'.*without credentials") as refused:
+        load_settings()
+    assert "secret" not in str(refused.value)
