@@ -171,6 +171,9 @@ def test_a_tick_maps_what_is_new_and_nothing_else(site, tmp_path, clouds, client
         "stages": "table",
         "progress": "progress",
     }
+    metrics = next(a for key, a in shown.items() if key.startswith("metrics-"))
+    named = {row["metric"] for row in json.loads(metrics.data)}
+    assert {"rooms", "walls", "doors", "windows", "furniture", "seconds"} <= named
     plan = next(a for key, a in shown.items() if key.startswith("plan-"))
     assert plan.data.startswith("data:image/png;base64,")
     progress = [a for a in client.read_artifacts(limit=200) if (a.key or "").startswith("progress")]

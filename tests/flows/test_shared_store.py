@@ -1,9 +1,7 @@
 """Runs on machines that share an address: each has a folder of its own, empty at first."""
 
-import importlib
 import shutil
 from datetime import UTC, datetime
-from pathlib import Path
 
 import fsspec
 import pytest
@@ -17,24 +15,8 @@ from storage.retention import Keep
 from storage.runs import COMPLETED, Run, recorded, runs_lease
 from storage.stages import of_run
 
-HERE = Path(__file__).parent
+pytestmark = pytest.mark.usefixtures("address")
 ALL = ["made:one", "made:two", "merged", "shifted:one", "shifted:two"]
-
-
-@pytest.fixture
-def toy(prefect_server, address, monkeypatch):
-    monkeypatch.syspath_prepend(str(HERE))
-    return importlib.import_module("toy.pipeline")
-
-
-@pytest.fixture
-def scans(tmp_path):
-    paths = []
-    for name, n in (("one", 10), ("two", 20)):
-        path = tmp_path / f"{name}.txt"
-        path.write_text(str(n))
-        paths.append(str(path))
-    return paths
 
 
 def test_what_one_machine_computed_is_a_hit_on_another(toy, scans, tmp_path):

@@ -1,6 +1,5 @@
 """The stage engine through Prefect's real engine, on a toy pipeline."""
 
-import importlib
 import json
 import os
 import shutil
@@ -17,22 +16,6 @@ from storage.stages import of_run
 
 HERE = Path(__file__).parent
 ALL = ["made:one", "made:two", "merged", "shifted:one", "shifted:two"]
-
-
-@pytest.fixture
-def toy(prefect_server, monkeypatch):
-    monkeypatch.syspath_prepend(str(HERE))
-    return importlib.import_module("toy.pipeline")
-
-
-@pytest.fixture
-def scans(tmp_path):
-    paths = []
-    for name, n in (("one", 10), ("two", 20)):
-        path = tmp_path / f"{name}.txt"
-        path.write_text(str(n))
-        paths.append(str(path))
-    return paths
 
 
 @pytest.fixture
