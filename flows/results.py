@@ -50,9 +50,11 @@ class Corrected:
     grammar: str = ""
     """file of the grammar; '' if none was named"""
     made: tuple[Ref, ...] = ()
-    """observations, layout, and the final plan's rooms and walls; none if it could not be used"""
+    """observations, layout, sightings, the final plan's rooms and walls; none if it is not used"""
     problem: str = ""
     """why it could not be used"""
+    note: str = ""
+    """which scans contradict the others, and had no say where they do"""
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ SIDE_M = 0.3
 """A side shorter than this does not say where the room's side wall meets the line. Assumption."""
 DEPTH_AT = (0.25, 0.5, 0.75)
 """Where along a room's face its depth is taken; the median counts."""
+REAR_AT = (0.2, 0.3, 0.45, 0.55, 0.7, 0.8)
+"""Where it is asked how straight the rear of a row is: in pairs, as a pointed or stepped room may
+be equally deep at places far apart."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ def survey(plan: Plan, params: LearnParams) -> Frontages:
 
 
 def _space(edge: NDArray[np.float64], row: Sequence[_Face]) -> Corners | None:
-    rear = [point for face in row for point in _rear(face)]
+    rear = [point for face in row for point in _rear(face, REAR_AT)]
     if not rear:
         return None
     first, last = row[0], row[-1]
@@ -221,16 +224,16 @@ def _end_wall(
 
 def _depth(face: _Face) -> float:
     """Return how far a room reaches from the line, the median over its face."""
-    depths = [depth for _, depth in _rear(face)]
+    depths = [depth for _, depth in _rear(face, DEPTH_AT)]
     return float(np.median(depths)) if depths else float(face.outline.bounds[3])
 
 
-def _rear(face: _Face) -> list[tuple[float, float]]:
-    """Return points of a room's rear face, as x and y."""
+def _rear(face: _Face, shares: Sequence[float]) -> list[tuple[float, float]]:
+    """Return points of a room's rear face, as x and y, at shares of its front."""
     x0, x1 = face.reach
     top = face.outline.bounds[3]
     found = []
-    for share in DEPTH_AT:
+    for share in shares:
         x = x0 + share * (x1 - x0)
         ray = LineString(((x, face.y + TOUCH_M), (x, top + 1.0)))
         parts = shapely.get_parts(shapely.intersection(ray, face.outline))

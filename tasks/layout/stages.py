@@ -10,8 +10,10 @@ from storage.layout_rooms import LayoutRooms
 from storage.observations import Observations
 from storage.rooms import Rooms
 from storage.segments import Segments
+from storage.sightings import Sightings
 from storage.sources import Source
 from storage.walls import Walls
+from tasks.layout.crowd.crowd import fuse_scans
 from tasks.layout.decoding.decode import DecodeParams, decode
 from tasks.layout.extraction.observations import ExtractParams, extract_observations
 from tasks.layout.placement.params import PlacementParams
@@ -25,9 +27,16 @@ def observe(
     return extract_observations(rooms, faces, segments, _read(grammar), params)
 
 
-def decode_rooms(observations: Observations, grammar: Source, params: DecodeParams) -> Layout:
-    """Find the most probable rooms along each reference line: `decode`."""
-    return decode(observations, _read(grammar), params)
+def decode_rooms(
+    observations: Observations, segments: list[Segments], grammar: Source, params: DecodeParams
+) -> tuple[Layout, Sightings]:
+    """Find the most probable rooms along each line, and hold scans against each other at them.
+
+    See `decode` and `fuse_scans`.
+    """
+    rules = _read(grammar)
+    layout = decode(observations, rules, params)
+    return layout, fuse_scans(observations, layout, segments, rules.partition_m, params.crowd)
 
 
 def place(
@@ -35,11 +44,12 @@ def place(
     walls: Walls,
     observations: Observations,
     layout: Layout,
+    sightings: Sightings,
     grammar: Source,
     params: PlacementParams,
 ) -> LayoutRooms:
     """Correct the initial model's rooms by the decoded ones: `place_rooms`."""
-    return place_rooms(rooms, walls, observations, layout, _read(grammar), params)
+    return place_rooms(rooms, walls, observations, layout, _read(grammar), params, sightings)
 
 
 def _read(grammar: Source) -> Grammar:

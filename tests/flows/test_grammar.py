@@ -23,7 +23,7 @@ OBJECTS = {
     *("furniture_segments", "furniture"),
 }
 """The stages that look into the final plan."""
-LAYOUT = {"observations", "layout", "layout_rooms", "layout_walls"}
+LAYOUT = {"observations", "layout", "sightings", "layout_rooms", "layout_walls"}
 
 
 def storey(name, seed):

@@ -1,16 +1,15 @@
 """Find the sequence of rooms along each reference line (Sec. 4.2.2, Fig. 8)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, PositiveInt
 
 from grammars.model import Grammar
 from storage.layout import HIDDEN, LINE_END, Layout
 from storage.observations import Observations
+from tasks.layout.crowd.crowd import CrowdParams
 from tasks.layout.decoding.kbest import best_decodings, rooms_of
 from tasks.layout.decoding.plain import PlainParams, best_rules, make_plain, rule_rooms
 from tasks.layout.decoding.posterior import (
@@ -26,12 +25,16 @@ from tasks.layout.decoding.segmental import (
     make_segmental,
     make_walls,
 )
+from tasks.layout.decoding.sequences import (
+    Line,
+    RoomSequence,
+    as_observed,
+    layout_of,
+    lines_of,
+)
 from tasks.layout.decoding.states import States, Unexplained, Units, make_states
 from tasks.layout.decoding.transitions import Transitions, transition_matrix
 from tasks.params import Params
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class DecodeParams(Params):
@@ -61,46 +64,8 @@ class DecodeParams(Params):
     """The paper's model."""
     segmental: SegmentalParams = SegmentalParams()
     """How walls are seen."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Line:
-    """One line's share of the observations."""
-
-    id: str
-    length: float
-    cuts: Floats
-    sigmas: Floats
-    presence: Floats
-    depths: Floats
-    rooms: Ints
-
-    @property
-    def bounds(self) -> Floats:
-        """Ends and cuts."""
-        return np.concatenate([[0.0], self.cuts, [self.length]])
-
-
-@dataclass(frozen=True, eq=False)
-class _Sequence:
-    """The rooms of one hypothesis of a line."""
-
-    line: str
-    hypothesis: int
-    states: Ints
-    """(m,), -1 unexplained"""
-    bounds: Floats
-    """(m + 1,)"""
-    cuts: Ints
-    """(m + 1,)"""
-    posteriors: Floats
-    """(m,)"""
-    walls: Floats
-    """(m + 1,), posterior of each wall"""
-    undivided: Floats
-    """(m,)"""
-    gain: float
-    log_p: float
+    crowd: CrowdParams = CrowdParams()
+    """How scans are held against each other at the decoded walls."""
 
 
 def decode(observations: Observations, grammar: Grammar, params: DecodeParams) -> Layout:
@@ -127,32 +92,18 @@ def decode(observations: Observations, grammar: Grammar, params: DecodeParams) -
     matrix = transition_matrix(
         grammar.p_apriori, grammar.p_relation, params.transitions, params.smoothing
     )
-    lines = list(_lines(observations))
+    lines = list(lines_of(observations))
     if params.decoder == "plain":
         states = make_states(grammar, matrix, params.units, None)
-        return _layout(list(_plain(lines, states, params)), states)
+        return layout_of(list(_plain(lines, states, params)), states)
     unexplained = Unexplained(params.p_unexplained, params.p_unexplained_again)
     states = make_states(
         grammar, matrix, params.units, unexplained if params.unexplained == "allowed" else None
     )
-    return _layout(list(_segmental(lines, states, params)), states)
+    return layout_of(list(_segmental(lines, states, params)), states)
 
 
-def _lines(observations: Observations) -> Iterator[_Line]:
-    for i, length in enumerate(observations.lengths_m):
-        cuts, intervals = observations.lines == i, observations.interval_lines == i
-        yield _Line(
-            str(observations.line_ids[i]),
-            float(length),
-            observations.cut_m[cuts],
-            observations.sigma_m[cuts],
-            observations.presence[cuts],
-            observations.depth_m[intervals],
-            observations.rooms[intervals],
-        )
-
-
-def _segmental(lines: list[_Line], states: States, params: DecodeParams) -> Iterator[_Sequence]:
+def _segmental(lines: list[Line], states: States, params: DecodeParams) -> Iterator[RoomSequence]:
     model = make_segmental(states, params.segmental)
     for line in lines:
         walls = make_walls(
@@ -167,14 +118,14 @@ def _segmental(lines: list[_Line], states: States, params: DecodeParams) -> Iter
             stand = wall_posteriors(model, walls, rooms, sums, params.near_m)
             whole = undivided(walls, rooms, sums)
             found = np.where(rooms.states < states.explained, rooms.states, -1)
-            yield _Sequence(
+            yield RoomSequence(
                 line.id, i, found, rooms.bounds_m, rooms.cuts, p, stand, whole, gain, decoding.log_p
             )
         if not decodings:
-            yield _as_observed(line)
+            yield as_observed(line)
 
 
-def _plain(lines: list[_Line], states: States, params: DecodeParams) -> Iterator[_Sequence]:
+def _plain(lines: list[Line], states: States, params: DecodeParams) -> Iterator[RoomSequence]:
     plain = make_plain(states, params.plain)
     widths = [np.diff(line.bounds) for line in lines]
     lengths = np.array([line.length for line in lines])
@@ -182,7 +133,7 @@ def _plain(lines: list[_Line], states: States, params: DecodeParams) -> Iterator
         lines, widths, *best_rules(plain, widths, lengths), strict=True
     ):
         if log_p == -np.inf:
-            yield _as_observed(line)
+            yield as_observed(line)
             continue
         found = rule_rooms(plain, states, observed, path, params.near_m)
         bounds, cuts, walls = [line.bounds[:1]], [np.array([LINE_END])], [np.ones(1)]
@@ -195,7 +146,7 @@ def _plain(lines: list[_Line], states: States, params: DecodeParams) -> Iterator
             cuts += [np.full(len(rooms) - 1, HIDDEN), np.array([end])]
             walls += [hidden, line.presence[i : i + 1] if end >= 0 else np.ones(1)]
         rooms, posteriors = (np.concatenate([f[k] for f in found]) for k in (0, 2))
-        yield _Sequence(
+        yield RoomSequence(
             line.id,
             0,
             rooms,
@@ -207,49 +158,3 @@ def _plain(lines: list[_Line], states: States, params: DecodeParams) -> Iterator
             float(log_p - log_any(params.segmental, observed).sum()),
             log_p,
         )
-
-
-def _as_observed(line: _Line) -> _Sequence:
-    count = len(line.cuts) + 1
-    cuts = np.concatenate([[LINE_END], np.arange(count - 1), [LINE_END]])
-    none, nothing = np.full(count, -1), np.zeros(count)
-    walls = np.concatenate([[1.0], line.presence, [1.0]])
-    return _Sequence(
-        line.id, 0, none, line.bounds, cuts, nothing, walls, np.ones(count), 0.0, -np.inf
-    )
-
-
-def _layout(sequences: list[_Sequence], states: States) -> Layout:
-    """Return the rows of sequences of rooms."""
-    counts = [len(s.states) for s in sequences]
-    at = _joined([s.states for s in sequences], np.int64)
-    # the row at -1 is the unexplained room's
-    ids = np.array([*states.rules[: states.explained], ""], np.str_)
-    classes = np.array([*states.classes[: states.explained], ""], np.str_)
-    parts = np.append(states.parts[: states.explained], 0)
-    widths = np.append(states.widths[: states.explained], np.nan)
-    spreads = np.append(states.spreads[: states.explained], np.nan)
-    return Layout(
-        line_ids=np.repeat(np.array([s.line for s in sequences], np.str_), counts),
-        hypotheses=np.repeat(np.array([s.hypothesis for s in sequences], np.int64), counts),
-        orders=_joined([np.arange(n) for n in counts], np.int64),
-        from_m=_joined([s.bounds[:-1] for s in sequences], np.float64),
-        to_m=_joined([s.bounds[1:] for s in sequences], np.float64),
-        from_cuts=_joined([s.cuts[:-1] for s in sequences], np.int64),
-        to_cuts=_joined([s.cuts[1:] for s in sequences], np.int64),
-        classes=classes[at],
-        rules=ids[at],
-        parts=parts[at],
-        widths_m=widths[at],
-        spreads_m=spreads[at],
-        posteriors=_joined([s.posteriors for s in sequences], np.float64),
-        from_posteriors=_joined([s.walls[:-1] for s in sequences], np.float64),
-        to_posteriors=_joined([s.walls[1:] for s in sequences], np.float64),
-        undivided=_joined([s.undivided for s in sequences], np.float64),
-        gains=np.repeat(np.array([s.gain for s in sequences], np.float64), counts),
-        log_p=np.repeat(np.array([s.log_p for s in sequences], np.float64), counts),
-    )
-
-
-def _joined(arrays: list[NDArray[Any]], dtype: type) -> NDArray[Any]:
-    return np.concatenate([np.empty(0, dtype), *arrays]).astype(dtype)

@@ -99,13 +99,14 @@ def lay_out(rooms: Rooms, faces: Faces, segments: Sequence[Segments]) -> Model:
         edges=outline.ends,
         owners=outline.shape,
         faces=faces,
-        strips=_strips(segments),
+        strips=strips_of(segments),
         height_m=float(np.median(known)) if len(known) else HEIGHT_M,
         tree=shapely.STRtree(rooms.polygons),
     )
 
 
-def _strips(segments: Sequence[Segments]) -> Strips:
+def strips_of(segments: Sequence[Segments]) -> Strips:
+    """Return the strips of wall that tell where it stands, scan by scan."""
     lines, normals = [np.empty((0, 2, 2))], [np.empty((0, 2))]
     areas, scans = [np.empty(0)], [np.empty(0, np.int64)]
     for number, scan in enumerate(segments):

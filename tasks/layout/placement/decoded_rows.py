@@ -40,6 +40,8 @@ class DecodedRow:
     """(m, 2), faces of all cuts of the line"""
     line_presence: NDArray[np.float64]
     """(m,)"""
+    depth_m: float
+    """how deep its rooms usually are, from the line on; infinite where that is not known"""
 
     @property
     def walled_ends(self) -> NDArray[np.bool_]:
@@ -118,7 +120,13 @@ def _row(
         standing=observations.rooms[intervals],
         line_faces_m=observations.faces_m[of_line],
         line_presence=observations.presence[of_line],
+        depth_m=_usual(observations.depth_m[intervals]),
     )
+
+
+def _usual(depth_m: NDArray[np.float64]) -> float:
+    known = depth_m[~np.isnan(depth_m)]
+    return float(np.median(known)) if len(known) else float("inf")
 
 
 def main_rows(rows: Sequence[DecodedRow], count: int) -> NDArray[np.int64]:

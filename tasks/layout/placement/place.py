@@ -5,11 +5,13 @@ from storage.layout import Layout
 from storage.layout_rooms import LayoutRooms
 from storage.observations import Observations
 from storage.rooms import Rooms
+from storage.sightings import NO_SIGHTINGS, Sightings
 from storage.walls import Walls
 from tasks.layout.placement.correction import Refused, corrected
 from tasks.layout.placement.decoded_rows import decoded_rows
 from tasks.layout.placement.labels import label_rooms
 from tasks.layout.placement.params import PlacementParams
+from tasks.layout.placement.repeated import with_sightings
 from tasks.layout.placement.storey import Storey
 
 INVALID = "would make the plan invalid"
@@ -23,6 +25,7 @@ def place_rooms(
     layout: Layout,
     grammar: Grammar,
     params: PlacementParams,
+    sightings: Sightings = NO_SIGHTINGS,
 ) -> LayoutRooms:
     """Return the rooms of the final plan.
 
@@ -32,6 +35,7 @@ def place_rooms(
     observations : what it says along its reference lines
     layout : the decoded rooms; the best hypothesis of each line is placed
     grammar : the one that decoded them; its partitions and depths
+    sightings : where the scans that agree have the walls of these rooms
 
     Returns
     -------
@@ -49,7 +53,12 @@ def place_rooms(
     round refuses something more, and the initial model is what is left when all is refused, a
     valid plan is always reached.
     """
-    rows = decoded_rows(observations, layout, params.end_sigma_m)
+    rows = with_sightings(
+        decoded_rows(observations, layout, params.end_sigma_m),
+        layout,
+        sightings,
+        (grammar.partition_m, grammar.partition_spread_m),
+    )
     storey = Storey(list(rooms.polygons), walls, rows, layout, grammar, params)
     refused = Refused()
     while True:

@@ -32,6 +32,7 @@ from storage.segments import Segments
 from storage.walls import Walls
 from tasks.evaluation.disturbance import DisturbParams, disturb
 from tasks.evaluation.rooms import ious, match
+from tasks.layout.crowd.crowd import CrowdParams, fuse_scans
 from tasks.layout.decoding.decode import DecodeParams, decode
 from tasks.layout.extraction.branches import BranchParams
 from tasks.layout.extraction.observations import ExtractParams, extract_observations
@@ -99,9 +100,11 @@ class Model:
             return self._score(variant.name, rooms.polygons, [""] * len(rooms))
         grammar = self.grammar(variant.grammar)
         observed = self._observations(variant.grammar, settings, rooms, faces)
-        layout = decode(observed, grammar, DecodeParams(**settings.get("decode", {})))
+        decoding = DecodeParams(**settings.get("decode", {}))
+        layout = decode(observed, grammar, decoding)
+        seen = fuse_scans(observed, layout, self._segments, grammar.partition_m, decoding.crowd)
         params = PlacementParams(**settings.get("place", {}))
-        placed = place_rooms(rooms, walls, observed, layout, grammar, params)
+        placed = place_rooms(rooms, walls, observed, layout, grammar, params, seen)
         lines = right_lines(layout, self._true_layout(observed, rooms))
         return self._score(variant.name, placed.rooms.polygons, placed.classes, lines)
 
@@ -111,7 +114,8 @@ class Model:
         observed, layout = self.observed(SAME), self.true_lines(SAME)
         rules = true_rules(layout, observed, self.polygons)
         grammar = replace(self.grammar(SAME), rules=rules)
-        placed = place_rooms(rooms, walls, observed, layout, grammar, PlacementParams())
+        seen = fuse_scans(observed, layout, self._segments, grammar.partition_m, CrowdParams())
+        placed = place_rooms(rooms, walls, observed, layout, grammar, PlacementParams(), seen)
         lines = right_lines(layout, layout)
         return self._score(ORACLE, placed.rooms.polygons, placed.classes, lines)
 

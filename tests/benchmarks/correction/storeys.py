@@ -1,7 +1,7 @@
 """The storeys grammars are scored on, those they are learnt from, and the scans of both. Simulated.
 
-A building is a layout of one size: its storeys differ in the rooms drawn along the corridor. Of
-each one storey is scored and another, its sibling, is known.
+A building is a layout of one size, its wings at one angle: its storeys differ in the rooms drawn
+along the corridor. Of each one storey is scored and another, its sibling, is known.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from storage.campaign import FILE
 from storage.plan import Plan
 from storage.plan_geojson import read_plan, write_plan
 from tasks.simulation.layouts.double_loaded import DoubleLoadedParams
-from tasks.simulation.layouts.irregular import IrregularParams
+from tasks.simulation.layouts.irregular import IrregularParams, irregular_layout
 from tasks.simulation.layouts.ring import RingParams
 from tasks.simulation.plan import StoreyParams, make_storey
 from tasks.simulation.presets import PRESETS
@@ -90,16 +90,25 @@ def _unseen() -> list[Scored]:
             for i, (m, w) in enumerate(((9, 6), (11, 7), (10, 8)))
         ),
     ]  # fmt: skip
-    return [
-        Scored(
-            building=name,
-            storey="1",
-            campaign=name,
-            params=StoreyParams(seed=SCORED_SEED + k, yaw_rad=_yaw(k), **size),
-            sibling=StoreyParams(seed=SIBLING_SEED + k, yaw_rad=_yaw(k), **size),
-        )
-        for k, (name, size) in enumerate(layouts)
+    drawn = [
+        StoreyParams(seed=SCORED_SEED + k, yaw_rad=_yaw(k), **size)
+        for k, (_, size) in enumerate(layouts)
     ]
+    return [
+        Scored(name, "1", name, params, _another(params, SIBLING_SEED + k))
+        for k, ((name, _), params) in enumerate(zip(layouts, drawn, strict=True))
+    ]
+
+
+def _another(params: StoreyParams, seed: int) -> StoreyParams:
+    """Return another storey of a building: what the first one's seed drew of its shell is kept."""
+    if params.layout != "irregular":
+        return params.model_copy(update={"seed": seed})
+    corridor = irregular_layout(params.irregular, np.random.default_rng(params.seed))[0].cell
+    main, wing = np.diff(np.array(corridor.exterior.coords)[:3], axis=0)
+    bend = float(np.arctan2(wing[1], wing[0]) - np.arctan2(main[1], main[0]))
+    pinned = params.irregular.model_copy(update={"bend_min_rad": bend, "bend_max_rad": bend})
+    return params.model_copy(update={"seed": seed, "irregular": pinned})
 
 
 def _yaw(k: int) -> float:

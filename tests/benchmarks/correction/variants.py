@@ -20,6 +20,8 @@ NO_GUARD: Settings = {
     "place.most_wrong": 1.0,
     "place.least_gain": -BOUNDLESS,
 }
+NO_CROWD: Settings = {"decode.crowd.p_outlier": 1e-300}
+"""No scan is ever an outlier: what was observed stands."""
 PAPER: Settings = {
     "decode.decoder": "plain",
     "decode.transitions": "paper",
@@ -65,6 +67,7 @@ INGREDIENTS = (
     Variant("no-joins", "rooms never joined", SAME, {"place.join_posterior": 1.0}),
     Variant("no-cuts", "rooms never cut in two", SAME, {"place.cut_posterior": 1.0}),
     Variant("all-cuts", "rooms cut wherever decoded", SAME, {"place.cut_posterior": 0.0}),
+    Variant("no-crowd", "scans never held against each other after decoding", SAME, NO_CROWD),
     Variant("wrong-no-guard", "a hospital's, nothing refused", WRONG, NO_GUARD),
     Variant("other-eq9", "other buildings', Eq. 9", OTHER, {"decode.transitions": "paper"}),
 )

@@ -166,3 +166,28 @@ def test_a_plan_without_corridor_is_refused_by_name():
     plan = Plan("ifp", "4", (PlanRoom("r", box(0, 0, 4, 5)),))
     with pytest.raises(MapSenseError, match="building 'ifp', storey '4': no room is a corridor"):
         survey(plan, PARAMS)
+
+
+def test_a_pointed_room_has_no_straight_rear_that_other_storeys_could_share(make_row):
+    plan = make_row([("seminar", 14.4)], NORTH)
+    (apart,) = (room for room in plan.rooms if room.class_ == "seminar")
+    west, south, east, north = apart.polygon.bounds
+    middle, shoulder = (west + east) / 2, north - 2.0
+    near = 0.35 * (east - west) / 2
+    # as deep a quarter from either end, deepest in the middle: an apse
+    apse = Polygon(
+        [(west, north), (west, shoulder), (middle - near, south), (middle + near, south),
+         (east, shoulder), (east, north)]
+    )  # fmt: skip
+    pointed = replace(
+        plan, rooms=tuple(replace(r, polygon=apse) if r is apart else r for r in plan.rooms)
+    )
+    for some, straight in ((plan, True), (pointed, False)):
+        found = survey(some, PARAMS)
+        own = [
+            line
+            for line, row in zip(found.lines, found.rows, strict=True)
+            if row[0].class_ == "seminar"
+        ]
+        assert [line.space is not None for line in own] == [straight]
+        assert all(line.space is not None for line in found.lines if line is not own[0])

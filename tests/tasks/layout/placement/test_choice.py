@@ -47,6 +47,7 @@ def row(walls, widths, spread=0.02, sigma=SIGMA, ends=None):
         standing=np.arange(n),
         line_faces_m=faces[1:-1],
         line_presence=np.ones(n - 1),
+        depth_m=np.inf,
     )
 
 

@@ -26,6 +26,7 @@ def row():
         standing=none.astype(int),
         line_faces_m=np.zeros((0, 2)),
         line_presence=none,
+        depth_m=np.inf,
     )
 
 

@@ -51,6 +51,7 @@ def row_on(start, end):
         standing=none.astype(int),
         line_faces_m=np.zeros((0, 2)),
         line_presence=none,
+        depth_m=np.inf,
     )
 
 

@@ -32,6 +32,7 @@ def row(presence, upper=4.1):
         standing=np.array([0, 1]),
         line_faces_m=np.array([(4.0, upper)]),
         line_presence=np.array([presence]),
+        depth_m=np.inf,
     )
 
 
