@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tasks.furniture.columns import Columns
+from tasks.furniture.windows import quantile
 from tasks.params import Params
 
 REACH = 2
@@ -133,19 +134,20 @@ def find_backs(
 
     Parameters
     ----------
-    tops : (n,) float
-        As from `panel_tops`, for all columns.
+    tops : (m,) float
+        As from `panel_tops`, of the columns to look at.
     rows : (m,) int
         The columns to look at.
     """
-    rows = rows[~np.isnan(tops[rows])]
+    held = ~np.isnan(tops)
+    rows, tops = rows[held], tops[held]
     if not len(rows):
         return []
     group = groups_of(columns.cells[rows].astype(np.int64), REACH)
     order = np.argsort(group, kind="stable")
     backs: list[Back] = []
     for part in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        backs += _of_panel(columns.centres(rows[part]), tops[rows[part]], columns.cell_m, params)
+        backs += _of_panel(columns.centres(rows[part]), tops[part], columns.cell_m, params)
     return backs
 
 
@@ -158,9 +160,9 @@ def _of_panel(
     _, axes = np.linalg.eigh(np.cov((xy - middle).T))
     axis, across = axes[:, 1], axes[:, 0]
     along, off = (xy - middle) @ axis, (xy - middle) @ across
-    low, high = np.quantile(along, (0.02, 0.98))
+    low, high = quantile(along, 0.02), quantile(along, 0.98)
     width = high - low + cell
-    thickness = np.ptp(np.quantile(off, (0.05, 0.95))) + cell
+    thickness = quantile(off, 0.95) - quantile(off, 0.05) + cell
     if thickness > params.thick_m or width < params.narrow_m:
         return []
     panel = float(width), float(thickness), float(len(xy) * cell**2 / (width * thickness))
@@ -174,7 +176,7 @@ def _of_panel(
         if not inside.any():
             continue
         centre = middle + (low - cell / 2 + (i + 0.5) * unit) * axis
-        centre = centre + np.median(off[inside]) * across
-        top = float(np.quantile(tops[inside], 0.8))
+        centre = centre + quantile(off[inside], 0.5) * across
+        top = quantile(tops[inside], 0.8)
         backs.append(Back(centre, axis, unit, top, panel, unit > 0.8 * params.width_m, n))
     return backs

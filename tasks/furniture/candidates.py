@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from tasks.furniture.boxes import Box
 
-BACK, SEAT, TOP, FRONT, ON_TABLE = range(5)
+BACK, SEAT, TOP, FRONT, ON_TABLE, SOFA = range(6)
 """What a candidate was found by: a back, a patch at seat height, any other patch, the front of a
-tall piece, a panel on a table."""
+tall piece, a panel on a table, a seat for several with a back or arms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Candidate:
     top: float
     """of its highest part"""
     found_by: int
-    """BACK, SEAT, TOP, FRONT or ON_TABLE"""
+    """BACK, SEAT, TOP, FRONT, ON_TABLE or SOFA"""
     siblings: int = 1
     """pieces that its patch or panel was split into, itself included"""
     seen_box: Box | None = None

@@ -11,6 +11,7 @@ from tasks.furniture.boxes import Box, fit_box
 from tasks.furniture.candidates import BACK, SEAT, Candidate
 from tasks.furniture.scene import Scene
 from tasks.furniture.tops import Top
+from tasks.furniture.windows import quantile
 from tasks.params import Params
 
 WALL_M = 0.1
@@ -63,14 +64,17 @@ def find_chairs(
     free = scene.from_wall > WALL_M
     for table in tables:
         free[_own_panels(scene, table)] = False
-    tops = np.full(len(scene.columns.counts), np.nan)
-    tops[scene.rows[free]] = scene.panels[free]
     level = (scene.heights >= params.seat_low_m) & (scene.heights <= params.seat_high_m)
     seats = np.flatnonzero(level & (scene.from_wall[scene.where] > 0.02))
     seat_xy = scene.xy[scene.where[seats]]
+    by_x = np.argsort(seat_xy[:, 0], kind="stable")
+    sorted_x = seat_xy[by_x, 0]
     taken = np.zeros(len(scene.where), bool)
-    for back in find_backs(scene.columns, tops, scene.rows, back_params):
-        near = seats[(np.abs(seat_xy - back.centre) <= NEAR_M).all(axis=1)]
+    for back in find_backs(scene.columns, scene.panels[free], scene.rows[free], back_params):
+        # a hall holds many chairs: only the seats in a strip are looked at
+        x = back.centre[0]
+        strip = by_x[slice(*np.searchsorted(sorted_x, (x - NEAR_M, x + NEAR_M)))]
+        near = np.sort(seats[strip[np.abs(seat_xy[strip, 1] - back.centre[1]) <= NEAR_M]])
         candidate = _with_seat(scene, back, near, params)
         taken[candidate.seen] = True
         taken[near[candidate.box.holds(scene.xy[scene.where[near]], 0.04)]] = True
@@ -124,13 +128,13 @@ def _chair(
         levels = scene.heights[seat]
         near = np.abs(levels[:, None] - levels) <= LEVEL_M
         seat = seat[near[np.argmax(near.sum(axis=1))]]
-        height = float(np.median(scene.heights[seat]))
+        height = quantile(scene.heights[seat], 0.5)
         local = scene.xy[scene.where[seat]] - back.centre
         along, out = local @ back.axis, local @ forward
         if back.row == 1 and not back.whole and len(seat) > 5:
-            low = min(low, float(np.quantile(along, 0.1)) - cell / 2)
-            high = max(high, float(np.quantile(along, 0.9)) + cell / 2)
-        depth = float(np.quantile(out, 0.95)) + cell / 2
+            low = min(low, quantile(along, 0.1) - cell / 2)
+            high = max(high, quantile(along, 0.9) + cell / 2)
+        depth = quantile(out, 0.95) + cell / 2
     missing = params.side_m - (high - low)
     if high - low < params.least_m:
         low, high = low - missing / 2, high + missing / 2
@@ -154,7 +158,7 @@ def _alone(scene: Scene, seats: NDArray[np.int64], params: ChairParams) -> Itera
     group = groups_of(cells, 2)
     order = np.argsort(group, kind="stable")
     for part in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        level = np.median(scene.heights[seats[part]])
+        level = quantile(scene.heights[seats[part]], 0.5)
         part = part[np.abs(scene.heights[seats[part]] - level) <= LEVEL_M]
         if len(part) * cell**2 < params.seat_area_m2:
             continue

@@ -106,7 +106,7 @@ def _chosen(
     least = np.array(_least(params))[best]
     kept = np.flatnonzero(confidences >= least)
     kept = kept[_one_each(segments, classes, confidences, kept, params.overlap)]
-    tops = np.where(classes == "chair", segments.top_m, segments.surface_m)[kept]
+    tops = np.where(classes == "table", segments.surface_m, segments.top_m)[kept]
     return Furniture(
         segments.footprints[kept],
         classes[kept],

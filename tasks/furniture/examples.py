@@ -1,5 +1,7 @@
 """Examples to learn from: segments named by a true plan, and real sizes in their surroundings."""
 
+from functools import cache
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -8,10 +10,12 @@ from pydantic import Field, NonNegativeInt
 from storage.furniture import CLASSES
 from storage.furniture_segments import FurnitureSegments
 from storage.plan import Plan
-from tasks.forest import Examples
-from tasks.furniture.candidates import SEAT, TOP
+from tasks.forest import Examples, joined
+from tasks.furniture.candidates import SEAT, SOFA, TOP
 from tasks.furniture.dimensions import SEAT_M, draw_m
 from tasks.furniture.features import FEATURES
+from tasks.furniture.homes import BUILDING, HomeParams, homes
+from tasks.furniture.segments import FurnitureSegmentParams, find_furniture_segments
 from tasks.params import Params
 
 NOTHING = "nothing"
@@ -22,32 +26,59 @@ SIZES = "tasks/furniture/dimensions.py"
 SAME, APART = 0.3, 0.15
 """IoU of a segment and a true piece over which it shows that piece, and under which it shows
 none; between them it teaches nothing. Assumption."""
+WORSE = 0.6
+"""Share of the best segment's IoU under which another of the same piece shows nothing: a table cut
+in two where it is one must not teach that halves are tables. Assumption; of 0.6 to 0.8 the one with
+which most is found on training and tuning storeys."""
 LEVEL_M = 0.08
 """How far a level segment may lie off the top of the piece it shows, metres."""
+SOFA_M = 0.15
+"""How far the edge seen of a sofa's back or arms may lie off its top, metres."""
 
 
 class RealSizeParams(Params):
-    """How many examples are made of the table of real sizes."""
+    """What is learnt of real sizes besides the simulated storeys."""
 
     each: NonNegativeInt = 300
     """Examples of each kind of furniture. Assumption: about as many as simulated storeys give."""
     seed: int = Field(default=0, ge=0, lt=2**32)
     """Seed of the sizes drawn."""
+    homes: HomeParams = HomeParams()
+    """Rooms of flats."""
 
 
 def examples_of(segments: FurnitureSegments, truth: Plan) -> Examples:
     """Return the segments a true plan names, of the classes of CLASS_NAMES.
 
     A segment is the true piece that it overlaps most, if their heights agree: a table and most
-    else by its top, a chair by any surface under its back's edge.
+    else by its top, a chair by any surface under its back's edge. Of several segments of one piece
+    those count that are nearly as good as the best.
     """
     names = np.array([piece.class_ or "" for piece in truth.furniture])
-    shapes = np.array([piece.footprint for piece in truth.furniture], object)
-    tops = np.array([np.nan if p.top_m is None else p.top_m for p in truth.furniture], float)
+    found, overlaps = _shown(segments, truth, names)
+    best = np.zeros(len(names))
+    np.maximum.at(best, found[found >= 0], overlaps[found >= 0])
     labels = np.full(len(segments), CLASS_NAMES.index(NOTHING))
     kept = np.ones(len(segments), bool)
+    for i in np.flatnonzero(found >= 0):
+        name = names[found[i]]
+        if overlaps[i] < SAME or name not in CLASSES:
+            kept[i] = overlaps[i] < APART
+        elif overlaps[i] >= WORSE * best[found[i]]:
+            labels[i] = CLASSES.index(name)
+    group = np.full(len(segments), f"{truth.building}/{truth.storey}")
+    return Examples(segments.features, labels.astype(np.int64), group)[kept]
+
+
+def _shown(
+    segments: FurnitureSegments, truth: Plan, names: NDArray[np.str_]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the true piece that each segment overlaps most, -1 for none, and their IoU."""
+    shapes = np.array([piece.footprint for piece in truth.furniture], object)
+    tops = np.array([np.nan if p.top_m is None else p.top_m for p in truth.furniture], float)
     found_by = segments.features[:, FEATURES.index("found_by")]
     tree = shapely.STRtree(shapes)
+    found, best = np.full(len(segments), -1), np.zeros(len(segments))
     for i, footprint in enumerate(segments.footprints):
         near = tree.query(footprint, predicate="intersects")
         near = near[_agree(segments, i, found_by[i], names[near], tops[near])]
@@ -55,13 +86,9 @@ def examples_of(segments: FurnitureSegments, truth: Plan) -> Examples:
             continue
         shared = shapely.area(shapely.intersection(shapes[near], footprint))
         overlaps = shared / (shapely.area(shapes[near]) + footprint.area - shared)
-        best = int(np.argmax(overlaps))
-        if overlaps[best] >= SAME and names[near[best]] in CLASSES:
-            labels[i] = CLASSES.index(names[near[best]])
-        else:
-            kept[i] = overlaps[best] < APART
-    group = np.full(len(segments), f"{truth.building}/{truth.storey}")
-    return Examples(segments.features, labels.astype(np.int64), group)[kept]
+        most = int(np.argmax(overlaps))
+        found[i], best[i] = near[most], overlaps[most]
+    return found, best
 
 
 def _agree(
@@ -72,16 +99,19 @@ def _agree(
     tops: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """Return which pieces may be seen at the height of a segment."""
+    if found_by == SOFA:
+        same: NDArray[np.bool_] = np.abs(tops - segments.top_m[i]) <= SOFA_M
+        return same & (names == "other")
     level = np.abs(tops - segments.surface_m[i]) <= LEVEL_M
     seat = (segments.surface_m[i] < tops + LEVEL_M) & (found_by != TOP)
     return np.isnan(tops) | np.where(names == "chair", seat | level, level)
 
 
 def real_sizes(simulated: Examples, params: RealSizeParams) -> Examples:
-    """Return examples with the sizes of real furniture, seen as simulated pieces were.
+    """Return examples with the sizes of real furniture, and rooms of flats.
 
-    Each takes a simulated example of its class, with its cues, and the size of a real piece: what
-    was seen of the simulated one, as a share of its box, is seen of the real one.
+    Each of the first takes a simulated example of its class, with its cues, and the size of a
+    real piece: what was seen of the simulated one, as a share of its box, is seen of the real one.
 
     Parameters
     ----------
@@ -98,7 +128,20 @@ def real_sizes(simulated: Examples, params: RealSizeParams) -> Examples:
     features = np.concatenate([np.empty((0, len(FEATURES))), *parts])
     made = [CLASSES.index(c) for c in KINDS.values() if len(_models(simulated, c)) and params.each]
     labels = np.repeat(np.array(made, np.int64), params.each)
-    return Examples(features, labels, np.full(len(labels), SIZES))
+    resized = Examples(features, labels, np.full(len(labels), SIZES))
+    return joined([resized, home_examples(params.homes)])
+
+
+@cache
+def home_examples(params: HomeParams) -> Examples:
+    """Return what is learnt of rooms of flats, found as with the default parameters."""
+    found = [
+        examples_of(find_furniture_segments(rooms, points, FurnitureSegmentParams()), truth)
+        for rooms, points, truth in homes(params)
+    ]
+    none = Examples(np.empty((0, len(FEATURES))), np.empty(0, np.int64), np.empty(0, "U1"))
+    every = joined([none, *found])
+    return Examples(every.features, every.labels, np.full(len(every), BUILDING))
 
 
 KINDS = {"chair": "chair", "table": "table", "desk": "table", "cabinet": "other", "shelf": "other"}

@@ -40,6 +40,8 @@ FEATURES = (
     "seat_cells",
     "table_share",
     "panel_below",
+    "closed_below",
+    "level_around",
 )
 """In the order of the columns: the five of Sec. 6 (the area by triangles, the distance to the floor
 of Eq. 12, width and depth of what was seen, their ratio), then cues of its surroundings."""
@@ -47,6 +49,8 @@ HULL_RATIO = 0.25
 """How closely a concave hull follows its points: 0 closest, 1 convex. Assumption."""
 APART_M = 0.3
 """How far apart along x or y the middles of a candidate and another table are, metres."""
+LEVEL_M, AROUND_M = 0.04, 0.16
+"""How far heights of one level may differ, and how far around a box it is looked for, metres."""
 RIM_M = 0.06
 """Width of the rim in which fronts, panels and legs stand, metres."""
 
@@ -112,10 +116,10 @@ def features_of(
         float(scene.from_wall[inside].min()) if len(inside) else np.nan,
         max(box.area / cell**2 - len(inside), 0.0) * cell**2 / box.area,
         *_back(scene, candidate, inside),
-        _occupied(scene, inside, 0.08, candidate.height - 0.08),
-        _occupied(scene, rim, 0.08, candidate.height - 0.08),
+        scene.filled(inside, 0.08, candidate.height - 0.08),
+        scene.filled(rim, 0.08, candidate.height - 0.08),
         float(scene.floor_seen[inside].mean()) if len(inside) else np.nan,
-        _occupied(scene, inside, candidate.height + 0.1, candidate.height + 0.5),
+        scene.filled(inside, candidate.height + 0.1, candidate.height + 0.5),
         float(candidate.siblings),
         float(candidate.found_by),
         float(nearest.min()) if len(nearest) else np.nan,
@@ -124,6 +128,8 @@ def features_of(
         float(len(places)),
         len(scene.surfaces_in(box, *TABLE_M)) / cells,
         _under_panel(scene, inside),
+        scene.closed(box, 0.12, candidate.height - 0.08),
+        _level_around(scene, box, cells, candidate.height),
     )
     return hull, np.array(row)
 
@@ -131,14 +137,6 @@ def features_of(
 def hull_box_area(hull: shapely.Polygon) -> float:
     """Return the area of the smallest box around a hull, square metres."""
     return float(shapely.minimum_rotated_rectangle(hull).area)
-
-
-def _occupied(scene: Scene, places: NDArray[np.int64], low: float, high: float) -> float:
-    """Return the share of the slices of columns between two heights that hold points."""
-    if not len(places) or high <= low:
-        return np.nan
-    counts = scene.slices(places, low, high)
-    return float((counts > 0).mean()) if counts.size else np.nan
 
 
 def _back(scene: Scene, candidate: Candidate, inside: NDArray[np.int64]) -> tuple[float, float]:
@@ -156,7 +154,7 @@ def _back(scene: Scene, candidate: Candidate, inside: NDArray[np.int64]) -> tupl
 def _under_panel(scene: Scene, inside: NDArray[np.int64]) -> float:
     """Return the share of slices under the panels that hold points: a cabinet's front goes down
     to the floor, a chair's back has legs under it at most."""
-    return _occupied(scene, inside[~np.isnan(scene.panels[inside])], 0.05, 0.35)
+    return scene.filled(inside[~np.isnan(scene.panels[inside])], 0.05, 0.35)
 
 
 def _higher(scene: Scene, box: Box, inside: NDArray[np.int64], height: float) -> float:
@@ -165,3 +163,13 @@ def _higher(scene: Scene, box: Box, inside: NDArray[np.int64], height: float) ->
         return np.nan
     over = scene.surfaces_in(box, height + 0.08, np.inf)
     return len(np.unique(scene.where[over])) / len(inside)
+
+
+def _level_around(scene: Scene, box: Box, cells: int, height: float) -> float:
+    """Return how much of the same level goes on around a box, as a share of the box.
+
+    A chair's seat ends at its edges; part of a bed or of a low table goes on.
+    """
+    near = scene.surfaces_in(box, height - LEVEL_M, height + LEVEL_M, AROUND_M)
+    outside = ~box.holds(scene.xy[scene.where[near]], 0.02)
+    return float(outside.sum()) / cells

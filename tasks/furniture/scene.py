@@ -12,9 +12,13 @@ from tasks.furniture.backs import BackParams, panel_tops
 from tasks.furniture.boxes import Box, room_directions
 from tasks.furniture.columns import Columns, floors_of
 from tasks.furniture.patches import PatchParams, find_patches, upper_surfaces
+from tasks.furniture.windows import closed_side, filled_share, from_edges, rows_in
 
 FLOOR_M = 0.06
 """How far from the floor's height its points may lie, metres: noise and drift."""
+OUT_M, IN_M = 0.04, 0.1
+"""How far out of a box and how far in its closed front may stand, metres: noise, and how far a top
+reaches over what carries it. Assumption."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +59,16 @@ class Scene:
         low = np.clip(np.floor(middle - reach / self.columns.cell_m), 0, shape).astype(np.int64)
         high = np.clip(np.ceil(middle + reach / self.columns.cell_m), 0, shape).astype(np.int64)
         # the raster's window, not the room: halls are large
-        near = self.columns.index[low[0] : high[0], low[1] : high[1]].ravel().astype(np.int64)
-        near = near[(near >= self.rows[0]) & (near <= self.rows[-1])] - self.rows[0]
-        return near[box.holds(self.xy[near], margin)]
+        return rows_in(
+            self.columns.index,
+            (int(low[0]), int(high[0]), int(low[1]), int(high[1])),
+            int(self.rows[0]),
+            int(self.rows[-1]),
+            self.xy,
+            box.centre,
+            box.axis,
+            (box.length / 2 + margin, box.depth / 2 + margin),
+        )
 
     def surfaces_in(
         self, box: Box, low: float, high: float, margin: float = 0.0
@@ -77,6 +88,38 @@ class Scene:
         last = highest if np.isinf(high) else max(self.columns.slice_of(high), first + 1)
         counts: NDArray[np.uint8] = self.columns.counts[self.rows[places], first:last]
         return counts
+
+    def filled(self, places: NDArray[np.int64], low: float, high: float) -> float:
+        """Return the share of the slices of columns between two heights that hold points.
+
+        NaN without any slice.
+        """
+        first, last = self._slices(low, high)
+        if not len(places) or high <= low or last <= first:
+            return np.nan
+        return float(filled_share(self.columns.counts, self.rows[places], first, last))
+
+    def closed(self, box: Box, low: float, high: float) -> float:
+        """Return how much of the side of a box that is filled best holds points.
+
+        Between two heights, by cells of columns and slices; NaN without any. The front of a
+        cupboard is closed; of a table legs are seen, and at most a panel at its ends.
+        """
+        places = self.within(box, OUT_M)
+        first, last = self._slices(low, high)
+        if not len(places) or high <= low or last <= first:
+            return np.nan
+        half = box.length / 2 + OUT_M, box.depth / 2 + OUT_M
+        local, rows = box.local(self.xy[places]), self.rows[places]
+        cell = self.columns.cell_m
+        return float(
+            closed_side(self.columns.counts, rows, local, half, OUT_M + IN_M, cell, first, last)
+        )
+
+    def _slices(self, low: float, high: float) -> tuple[int, int]:
+        first = max(self.columns.slice_of(low), 0)
+        last = max(self.columns.slice_of(high), first + 1)
+        return first, min(last, self.columns.counts.shape[1])
 
 
 def scenes(
@@ -100,8 +143,6 @@ def scenes(
         rows = np.flatnonzero(columns.rooms == room)
         mine = np.flatnonzero(surface_room == room)
         xy = columns.centres(rows)
-        outline = rooms.polygons[room].boundary
-        shapely.prepare(outline)
         yield Scene(
             int(room),
             rooms.polygons[room],
@@ -110,7 +151,7 @@ def scenes(
             columns,
             rows,
             xy,
-            shapely.distance(outline, shapely.points(xy)),
+            from_edges(xy, _edges(rooms.polygons[room])),
             floor_seen[rows],
             panels[rows],
             standing[rows],
@@ -118,3 +159,10 @@ def scenes(
             heights[mine],
             tuple(np.searchsorted(mine, patches[i]) for i in np.flatnonzero(patch_room == room)),
         )
+
+
+def _edges(polygon: shapely.Polygon) -> NDArray[np.float64]:
+    """Return the (e, 2, 2) edges of a room, those of its holes included."""
+    rings = (polygon.exterior, *polygon.interiors)
+    corners = [shapely.get_coordinates(ring) for ring in rings]
+    return np.concatenate([np.stack((ring[:-1], ring[1:]), axis=1) for ring in corners])

@@ -14,6 +14,7 @@ from tasks.furniture.features import FEATURES, features_of
 from tasks.furniture.fronts import FrontParams, find_fronts
 from tasks.furniture.patches import PatchParams
 from tasks.furniture.scene import scenes
+from tasks.furniture.sofas import SofaParams, find_sofas
 from tasks.furniture.splitting import RunParams, SplitParams
 from tasks.furniture.standing import find_standing
 from tasks.furniture.tops import TopParams, candidates, find_tops, tables_among
@@ -39,6 +40,8 @@ class FurnitureSegmentParams(Params):
     """When a run of cabinets is several."""
     fronts: FrontParams = FrontParams()
     """What may be the front of a tall piece."""
+    sofas: SofaParams = SofaParams()
+    """What may be a sofa."""
     standing: BackParams = BackParams(
         low_m=0.9, high_m=1.45, deep_m=0.2, width_m=0.58, narrow_m=0.2, wide_m=0.9, thick_m=0.2
     )
@@ -65,6 +68,7 @@ def find_furniture_segments(
             *find_chairs(scene, tables, params.backs, params.chairs),
             *find_fronts(scene, params.fronts, params.runs),
             *find_standing(scene, tables, params.standing),
+            *find_sofas(scene, level, params.sofas),
         ]
         for candidate in found:
             hull, row = features_of(scene, candidate, table_boxes, outlines)

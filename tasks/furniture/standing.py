@@ -34,9 +34,7 @@ def find_standing(scene: Scene, tables: list[Top], params: BackParams) -> Iterat
         tops = scene.standing[places]
         with np.errstate(invalid="ignore"):
             fits = (tops > table.height + OVER_M) & (tops < table.height + MOST_M)
-        kept = np.full(len(scene.columns.counts), np.nan)
-        kept[scene.rows[places[fits]]] = tops[fits]
-        for back in find_backs(scene.columns, kept, scene.rows[places[fits]], params):
+        for back in find_backs(scene.columns, tops[fits], scene.rows[places[fits]], params):
             box = Box(back.centre, back.axis, back.width, DEPTH_M)
             seen = scene.surfaces_in(box, back.top - 0.08, back.top + 0.08)
             yield Candidate(

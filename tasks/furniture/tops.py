@@ -12,12 +12,13 @@ from scipy import ndimage
 from tasks.furniture.boxes import Box, fit_box, without_fringe
 from tasks.furniture.candidates import TOP, Candidate
 from tasks.furniture.dimensions import widths_m
+from tasks.furniture.elbows import cut_at_corner
 from tasks.furniture.scene import Scene
 from tasks.furniture.splitting import RunParams, SplitParams, pieces, split_grid, split_run
 from tasks.params import Params
 
-TABLE_M = (0.62, 1.0)
-"""Heights between which a patch may be tables that touch, metres: low tables to benches."""
+TABLE_M = (0.66, 1.0)
+"""Heights between which a patch may be tables that touch, metres: tables to benches, not beds."""
 
 RUN_M = (0.2, 0.7)
 """Least and greatest depth of a patch that may be a run of shelves, cabinets or cupboards."""
@@ -64,10 +65,23 @@ def find_tops(scene: Scene, params: TopParams) -> list[Top]:
     """Return the level patches of a room that are wide somewhere, parts of one top joined."""
     tops = []
     for patch in scene.patches:
+        if len(patch) * scene.columns.cell_m**2 < params.area_m2:
+            continue
         wide = _without_thin(scene, patch, params)
         if len(wide) * scene.columns.cell_m**2 >= params.area_m2:
             tops.append(_top(scene, wide))
-    return _joined(scene, tops, params)
+    return [part for top in _joined(scene, tops, params) for part in _cut(scene, top)]
+
+
+def _cut(scene: Scene, top: Top) -> list[Top]:
+    """Return a top, or the parts of one that goes round a corner."""
+    if top.height < TABLE_M[0]:
+        return [top]
+    before = cut_at_corner(scene.xy[scene.where[top.surfaces]], top.box, scene.columns.cell_m)
+    if before is None:
+        return [top]
+    parts = (_top(scene, top.surfaces[before]), _top(scene, top.surfaces[~before]))
+    return [piece for part in parts for piece in _cut(scene, part)]
 
 
 def tables_among(tops: list[Top]) -> list[Top]:

@@ -19,7 +19,7 @@ from storage.forest import Forest
 from storage.furniture_segments import FurnitureSegments
 from tasks.forest import Examples, fit, joined
 from tasks.furniture.classification import named
-from tasks.furniture.examples import CLASS_NAMES, RealSizeParams, examples_of, real_sizes
+from tasks.furniture.examples import CLASS_NAMES, examples_of, real_sizes
 from tasks.furniture.features import FEATURES
 from tasks.furniture.segments import FurnitureSegmentParams, find_furniture_segments
 
@@ -43,8 +43,8 @@ def examples_from(storey: Surroundings, each: Sequence[FurnitureSegmentParams]) 
 
 def _grown(variant: Variant, each: Sequence[Examples]) -> Forest:
     examples = joined(each)
-    if variant.real_sizes:
-        examples = joined([examples, real_sizes(examples, RealSizeParams())])
+    if variant.real_sizes is not None:
+        examples = joined([examples, real_sizes(examples, variant.real_sizes)])
     examples.features[:, _columns(variant)] = np.nan
     return fit(examples, FEATURES, CLASS_NAMES, variant.forest)
 

@@ -7,12 +7,15 @@ from tasks.forest import ForestParams
 from tasks.furniture.backs import BackParams
 from tasks.furniture.chairs import ChairParams
 from tasks.furniture.classification import FurnitureParams
+from tasks.furniture.examples import RealSizeParams
 from tasks.furniture.fronts import FrontParams
+from tasks.furniture.homes import HomeParams
 from tasks.furniture.segments import FurnitureSegmentParams
 from tasks.furniture.splitting import RunParams, SplitParams
 
 FOREST = LEARNERS["furniture"].forest
 FURNITURE = FurnitureParams()
+SIZES = RealSizeParams()
 SEGMENTS = FurnitureSegmentParams()
 TOGETHER = SEGMENTS.model_copy(
     update={
@@ -33,7 +36,7 @@ BACK = (
     *("top_m", "back_share", "back_rise_m", "panel_below"),
     *("panel_width_m", "panel_thickness_m", "panel_share"),
 )
-LEGS = ("below", "rim_below")
+LEGS = ("below", "rim_below", "closed_below")
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,8 @@ class Variant:
     name: str
     segments: FurnitureSegmentParams = SEGMENTS
     forest: ForestParams = FOREST
-    real_sizes: bool = True
+    real_sizes: RealSizeParams | None = SIZES
+    """what the forest learns besides the simulated storeys"""
     without: tuple[str, ...] = ()
     """features the forest is not told"""
     furniture: FurnitureParams = FURNITURE
@@ -58,7 +62,8 @@ OTHERS = (
     Variant("with workplaces", furniture=FurnitureParams(workplaces=0.5, chair=0.4)),
     Variant("with workplaces in full", furniture=FurnitureParams(workplaces=1.0)),
     Variant("100 trees", forest=_trees(100)),
-    Variant("without real sizes", real_sizes=False),
+    Variant("without real sizes", real_sizes=None),
+    Variant("without rooms of flats", real_sizes=RealSizeParams(homes=HomeParams(rooms=0))),
     Variant("without splitting", segments=TOGETHER),
     Variant("without features of backs", without=BACK),
     Variant("without features of legs", without=LEGS),

@@ -23,6 +23,7 @@ from tasks.furniture.classification import (
 from tasks.furniture.dimensions import CATALOGUE_M, SEAT_M
 from tasks.furniture.examples import CLASS_NAMES, RealSizeParams, examples_of, real_sizes
 from tasks.furniture.features import FEATURES
+from tasks.furniture.homes import HomeParams
 from tasks.furniture.segments import FurnitureSegmentParams, find_furniture_segments
 
 RULES = read_workplaces(FILE)
@@ -65,7 +66,9 @@ def examples(rooms):
 
 @pytest.fixture(scope="module")
 def forest(examples):
-    both = joined([examples, real_sizes(examples, RealSizeParams(each=40))])
+    both = joined(
+        [examples, real_sizes(examples, RealSizeParams(each=40, homes=HomeParams(rooms=0)))]
+    )
     return fit(both, FEATURES, CLASS_NAMES, ForestParams(trees=8))
 
 
@@ -145,16 +148,16 @@ def test_segments_are_named_by_the_true_plan_and_fragments_teach_nothing(rooms):
 
 
 def test_real_sizes_lie_within_the_catalogue_and_repeat_with_their_seed(examples):
-    made = real_sizes(examples, RealSizeParams(each=50, seed=3))
+    made = real_sizes(examples, RealSizeParams(each=50, seed=3, homes=HomeParams(rooms=0)))
     chairs = made[made.labels == CLASS_NAMES.index("chair")]
     assert len(chairs) == 50
     height = chairs.features[:, FEATURES.index("distance_m")]
     assert height.min() >= SEAT_M[0] and height.max() <= SEAT_M[1]
     widths = chairs.features[:, FEATURES.index("box_width_m")]
     assert widths.max() <= CATALOGUE_M["chair"]["width"][-1] + 1e-9
-    again = real_sizes(examples, RealSizeParams(each=50, seed=3))
+    again = real_sizes(examples, RealSizeParams(each=50, seed=3, homes=HomeParams(rooms=0)))
     assert again.features.tobytes() == made.features.tobytes()
-    other = real_sizes(examples, RealSizeParams(each=50, seed=4))
+    other = real_sizes(examples, RealSizeParams(each=50, seed=4, homes=HomeParams(rooms=0)))
     assert other.features.tobytes() != made.features.tobytes()
     nobody = Examples(np.empty((0, len(FEATURES))), np.empty(0, int), np.empty(0, "U4"))
-    assert len(real_sizes(nobody, RealSizeParams())) == 0
+    assert len(real_sizes(nobody, RealSizeParams(homes=HomeParams(rooms=0)))) == 0

@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 import shapely
 
+from grammars.workplaces.rules import FILE, read_workplaces
+from storage.forest import read_forest
 from storage.points import PointCloud
 from storage.rooms import Rooms
 from tasks.furniture.candidates import BACK, TOP
+from tasks.furniture.classification import FurnitureParams, named
+from tasks.furniture.examples import CLASS_NAMES
 from tasks.furniture.features import FEATURES
 from tasks.furniture.segments import FurnitureSegmentParams, find_furniture_segments
 
@@ -19,13 +23,21 @@ pytestmark = pytest.mark.skipif(not CLOUD.is_file(), reason="the real scans are 
 
 
 @pytest.fixture(scope="module")
-def segments():
+def xyz():
     data = CLOUD.read_bytes()
-    xyz = np.frombuffer(data[data.index(b"end_header\n") + 11 :], np.float32).reshape(-1, 3)
+    return np.frombuffer(data[data.index(b"end_header\n") + 11 :], np.float32).reshape(-1, 3)
+
+
+@pytest.fixture(scope="module")
+def room(xyz):
     low, high = np.quantile(xyz[:, :2], (0.002, 0.998), axis=0)
     one = np.ones(1)
     outline = np.array([shapely.box(*low, *high)], object)
-    room = Rooms(outline, 0 * one, 2.5 * one, one, one, ((0,),))
+    return Rooms(outline, 0 * one, 2.5 * one, one, one, ((0,),))
+
+
+@pytest.fixture(scope="module")
+def segments(xyz, room):
     return find_furniture_segments(room, [PointCloud(xyz, np.zeros(3))], FurnitureSegmentParams())
 
 
@@ -56,3 +68,12 @@ def test_four_of_five_chairs_are_found_though_three_seats_are_hidden(segments, t
     backs = [shapely.Point(chair["back_center"]) for chair in truth["chairs"]]
     near = [shapely.dwithin(shapes, back, 0.05).any() for back in backs]
     assert sum(near) >= 4
+
+
+def test_the_worktops_round_the_table_are_no_tables(segments, room, truth):
+    package = Path(__file__).resolve().parents[3] / "tasks/furniture"
+    forest = read_forest(package / "forest.parquet", segments.names, CLASS_NAMES)
+    furniture = named(segments, room, forest, read_workplaces(FILE), FurnitureParams())
+    tables = furniture.footprints[furniture.classes == "table"]
+    assert len(tables) == 1
+    assert tables[0].contains(shapely.Point(truth["tables"][0]["center"]))
