@@ -62,8 +62,12 @@ def _real_sizes(simulated: Examples) -> Examples:
     return real_sizes(simulated, RealSizeParams())
 
 
+OPENINGS_FOREST = ForestParams(trees=60, leaf=1, share=0.25, class_weights="equal")
+"""Most of a hundred thousand candidates are nothing: as if there were as many of each class, what
+is rare would be said too often. So, on training storeys held back, 0.87 to 0.90 of the doors found
+are doors instead of 0.80 to 0.84, and 0.02 fewer are found."""
 LEARNERS: Mapping[Kind, Learner] = {
-    "doors": Learner(OPENING_FEATURES, OPENING_CLASSES, ForestParams(), _openings, nothing_more),
+    "doors": Learner(OPENING_FEATURES, OPENING_CLASSES, OPENINGS_FOREST, _openings, nothing_more),
     "furniture": Learner(
         FURNITURE_FEATURES, FURNITURE_CLASSES, ForestParams(trees=8), _furniture, _real_sizes
     ),

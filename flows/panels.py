@@ -18,7 +18,6 @@ from flows.verbs import checked_name, writable
 from storage.artifacts import Place, Ref, read
 from storage.candidates import CANDIDATES, Candidates
 from storage.errors import MapSenseError
-from storage.forest import open_forest
 from storage.layout_walls import LAYOUT_WALLS
 from storage.made import WHOLE, made
 from storage.openings import DOOR, OPENINGS, Openings
@@ -26,6 +25,7 @@ from storage.runs import COMPLETED, PARTIAL, Run, read_runs
 from storage.snapshots import SNAPSHOTS, Snapshots
 from storage.wall_images import WALL_IMAGES, WallImages
 from storage.walls import WALLS, Walls
+from tasks.doors.classifying import read_classifier
 from tasks.doors.lines import Lines
 from tasks.doors.steps import FaceSteps, face_steps
 from tasks.exports.door_panels import (
@@ -85,7 +85,7 @@ def draw_wall(
         looked.candidates,
         looked.openings,
         looked.snapshots,
-        open_forest(shipped("doors")),
+        read_classifier(shipped("doors")),
         (looked.params.candidates, looked.params.openings),
     )
     images, pixel_m = looked.images, looked.images.pixel_m

@@ -20,7 +20,8 @@ from flows.params import MapSenseParams
 from flows.settings import default_jobs
 from flows.training_storeys import MappedStorey, mapped, scanned, simulation_code
 from storage.errors import MapSenseError
-from storage.forest import ClassScore, Forest, TrainedStorey, write_forest
+from storage.forest import Forest, write_forest
+from storage.forest_provenance import ClassScore, TrainedStorey
 from storage.plan_digest import plan_digest
 from storage.runs import COMPLETED, new_id, recorded
 from storage.stages import forget

@@ -40,6 +40,10 @@ _OF_A_FACE = {
     "left_step_m": "mean depth within, behind that of the strip left of the rectangle",
     "right_step_m": "mean depth within, behind that of the strip right of it",
     "over_step_m": "mean depth within, behind that of the strip over it",
+    "foot_step_m": "mean depth of the lowest metre within, behind that of both strips beside",
+    "left_rim_m": "mean depth just within the left side, behind that beyond the frame there",
+    "right_rim_m": "mean depth just within the right side, behind that beyond the frame there",
+    "head_rim_m": "mean depth just below the upper side, behind that over the frame",
     "wall_back_share": "back_share of the whole face",
     "noise_m": "median deviation of what was hit on the face from its wall",
 }

@@ -55,7 +55,7 @@ SCHEMA = schema(
         column("key", pa.string(), "cache key: code, versions, parameters and inputs"),
         column("outcome", pa.string(), "computed, cached or failed"),
         column("wall_s", pa.float64(), "reading inputs, computing and writing; looking up a hit"),
-        column("cpu_s", pa.float64(), "processor time of the thread the stage ran in"),
+        column("cpu_s", pa.float64(), "processor time of the stage, in all its threads"),
         column(
             "peak_memory_mb",
             pa.float64(),

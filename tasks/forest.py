@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveInt
 
-from storage.forest import LEAF, Forest, Provenance
+from storage.forest import LEAF, Forest
+from storage.forest_provenance import Provenance
 from tasks.params import Params
 
 
@@ -25,6 +26,9 @@ class ForestParams(Params):
     """Greatest depth of a tree; None: as deep as it grows. Assumption."""
     leaf: PositiveInt = 2
     """Least examples at a leaf. Assumption."""
+    share: float = Field(default=1.0, gt=0, le=1)
+    """How many examples a tree draws, as a share of all there are. Assumption: all. Candidates of
+    one opening are much alike, and a forest of many grows in time with fewer."""
     class_weights: Literal["equal", "balanced"] = "balanced"
     """What an example counts for: all the same, or each class the same in all. Assumption: there
     are many more things that are no door than doors."""
@@ -110,6 +114,7 @@ def fit(
         n_estimators=params.trees,
         max_depth=params.depth,
         min_samples_leaf=params.leaf,
+        max_samples=params.share,
         class_weight="balanced" if params.class_weights == "balanced" else None,
         random_state=params.seed,
         n_jobs=-1,  # in threads; the trees are the same however many

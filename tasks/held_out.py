@@ -1,17 +1,19 @@
-"""How well classes are told apart on storeys that were not trained on: one held back in turn."""
+"""How well classes are told apart on storeys that were not trained on: some held back in turn."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.forest import ClassScore
+from storage.forest_provenance import ClassScore
 from tasks.forest import Examples, ForestParams, fit, joined, predict
 
 Classifier = Callable[[Examples, NDArray[np.float64]], NDArray[np.float64]]
 """Learns from examples and returns the (m, c) probabilities of classes of other features."""
 SVM_EXAMPLES = 5000
 """Examples an SVM learns from at most: its time grows with more than their square."""
+FOLDS = 3
+"""Parts that groups are held back in. More groups than that are as many to learn from anew."""
 More = Callable[[Examples], Examples]
 """Makes further examples of some: what it makes must never be held back beside them."""
 
@@ -84,7 +86,8 @@ def held_out(examples: Examples, classes: int, classify: Classifier) -> NDArray[
     examples : Examples
         Of two or more groups.
     classify : Classifier
-        Trained anew for each group, without it.
+        Trained anew for each of FOLDS parts of the groups, without it; for each group if there are
+        no more than that.
 
     Returns
     -------
@@ -100,8 +103,9 @@ def held_out(examples: Examples, classes: int, classify: Classifier) -> NDArray[
     if len(groups) < 2:
         raise ValueError(f"{len(groups)} group of examples, expected 2 or more to hold one back")
     found = np.zeros((len(examples), classes))
-    for group in groups:
-        held = examples.groups == group
+    folds = min(FOLDS, len(groups))
+    for first in range(folds):
+        held = np.isin(examples.groups, groups[first::folds])
         found[held] = classify(examples[~held], examples.features[held])
     return found
 
@@ -131,7 +135,7 @@ def class_scores(
 def cross_validated(
     examples: Examples, class_names: Sequence[str], params: ForestParams, more: More = nothing_more
 ) -> dict[str, tuple[ClassScore, ...]]:
-    """Return the scores of forest and SVM, each group held back in turn.
+    """Return the scores of forest and SVM on groups held back, as of `held_out`.
 
     Parameters
     ----------

@@ -12,6 +12,8 @@ MEASURED = (*SHARES, *(name for name in OF_A_FACE if name not in OF_THE_WHOLE_FA
 """What is measured of a rectangle, in the order of the columns of `measure`."""
 FLUSH_M = 0.1
 """Depths beyond this, metres, count as this in a mean: wall, frame and leaf lie within."""
+FOOT_M = 1.0
+"""Height of what counts as the foot of a door, metres: below a window there is wall."""
 LEAST_HITS = 8
 """Pixels below which a spread or a slope says nothing."""
 
@@ -42,7 +44,8 @@ def measure(
     pixel : metres of a pixel
     """
     a, b = labels.shape
-    found = np.full((len(boxes), 19), np.nan)
+    found = np.full((len(boxes), len(MEASURED)), np.nan)
+    foot = round(FOOT_M / pixel)
     hits = np.empty(a * b)
     for n in range(len(boxes)):
         i0, i1 = max(boxes[n, 0], 0), min(boxes[n, 1], a)
@@ -97,6 +100,23 @@ def measure(
             found[n, 16] = inside - _mean(depth, i0 - strip, i0, j0, j1)
             found[n, 17] = inside - _mean(depth, i1, i1 + strip, j0, j1)
             found[n, 18] = inside - _mean(depth, i0, i1, j1, j1 + strip)
+        up = min(j1, foot)
+        left, right = _mean(depth, i0 - strip, i0, 0, up), _mean(depth, i1, i1 + strip, 0, up)
+        if np.isnan(left) or np.isnan(right):
+            beside = right if np.isnan(left) else left
+        else:
+            beside = (left + right) / 2
+        found[n, 19] = _mean(depth, i0, i1, 0, up) - beside
+        rim, out = 2 * frame, 3 * frame
+        found[n, 20] = _mean(depth, i0, i0 + rim, j0, j1) - _mean(
+            depth, i0 - out, i0 - frame, j0, j1
+        )
+        found[n, 21] = _mean(depth, i1 - rim, i1, j0, j1) - _mean(
+            depth, i1 + frame, i1 + out, j0, j1
+        )
+        found[n, 22] = _mean(depth, i0, i1, j1 - rim, j1) - _mean(
+            depth, i0, i1, j1 + frame, j1 + out
+        )
     return found
 
 

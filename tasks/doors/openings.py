@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveInt
 
-from storage.candidates import FEATURES, SHARES, Candidates
+from storage.candidates import SHARES, Candidates
 from storage.forest import Forest
 from storage.openings import DOOR, WINDOW, Openings
 from storage.rooms import Rooms
 from storage.snapshots import Snapshots
 from storage.wall_images import WallImages
 from storage.walls import Walls
+from tasks.doors.classifying import classified
 from tasks.doors.crosscheck import CrossCheckParams, distinct, on_walls
 from tasks.doors.examples import CLASSES, DOOR_CLASSES
 from tasks.doors.merging import MergingParams, Rectangles, per_door, per_wall, weights
 from tasks.doors.states import StateParams, states
 from tasks.doors.topology import TopologyParams, doors_of_rooms, rooms_beside
 from tasks.doors.trajectory import TrajectoryParams, crossed, crossings, steps
-from tasks.forest import predict
 from tasks.geometry import unit_axes
 from tasks.params import Params
 
@@ -111,12 +111,7 @@ def find_openings(
     candidates : found on `images`
     images, walls, rooms : of one storey
     snapshots : of its scans
-    forest : tells `CLASSES` apart by `FEATURES`
-
-    Raises
-    ------
-    ValueError
-        If the forest knows other features.
+    forest : as of `read_classifier`
 
     Notes
     -----
@@ -166,25 +161,6 @@ def told_openings(
         states=np.concatenate([states(doors.states, params.states), [""] * len(windows)]),
         confidences=np.concatenate([doors.confidences, windows.confidences]),
     )
-
-
-def classified(candidates: Candidates, forest: Forest) -> NDArray[np.float64]:
-    """Return the probability of each of CLASSES, (n, c); a forest may know some features only.
-
-    Raises
-    ------
-    ValueError
-        If the forest knows other features, or other classes.
-    """
-    unknown = sorted(set(forest.features) - set(FEATURES))
-    if unknown or set(forest.classes) != set(CLASSES):
-        raise ValueError(
-            f"forest: features {', '.join(unknown) or 'as expected'}, classes "
-            f"{', '.join(forest.classes)}; expected features of ours and classes "
-            f"{', '.join(CLASSES)}: train it again"
-        )
-    asked = candidates.features[:, [FEATURES.index(name) for name in forest.features]]
-    return predict(forest, asked)[:, [forest.classes.index(name) for name in CLASSES]]
 
 
 def door_probabilities(

@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from storage.candidates import FEATURES, Candidates
-from storage.errors import InputError
-from storage.forest import Forest, open_forest
+from storage.candidates import Candidates
 from storage.layout_rooms import LayoutRooms
 from storage.layout_walls import LayoutWalls
 from storage.openings import Openings
@@ -13,7 +11,7 @@ from storage.snapshots import Snapshots
 from storage.sources import Source
 from storage.wall_images import WallImages
 from storage.walls import Walls
-from tasks.doors.examples import CLASSES
+from tasks.doors.classifying import read_classifier
 from tasks.doors.openings import OpeningsParams, find_openings
 
 
@@ -33,7 +31,7 @@ def openings(
     InputError
         If the forest's file is none, or of something else than openings.
     """
-    trained = _read(Path(forest.path))
+    trained = read_classifier(Path(forest.path))
     return find_openings(candidates, images, walls, rooms, snapshots, trained, params)
 
 
@@ -48,19 +46,3 @@ def layout_openings(
 ) -> Openings:
     """Find the doors and windows of a plan its grammar has corrected: `openings`."""
     return openings(candidates, images, walls.walls, rooms.rooms, snapshots, forest, params)
-
-
-def _read(path: Path) -> Forest:
-    """Read a forest of our classes by our features, or by some of them as the paper's."""
-    forest = open_forest(path)
-    unknown = sorted(set(forest.features) - set(FEATURES))
-    if unknown or forest.classes != CLASSES:
-        problem = f"tells {', '.join(forest.classes)} apart"
-        if unknown:
-            problem = f"asks for {', '.join(unknown)}"
-        raise InputError(
-            path,
-            f"the forest {problem}, expected {', '.join(CLASSES)} by features of openings",
-            "name another file, or train it anew with 'mapsense train doors'",
-        )
-    return forest

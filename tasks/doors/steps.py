@@ -12,11 +12,12 @@ from storage.snapshots import Snapshots
 from storage.wall_images import WallImages
 from storage.walls import Walls
 from tasks.doors.candidates import CandidateParams
+from tasks.doors.classifying import classified
 from tasks.doors.crosscheck import on_walls
 from tasks.doors.edges import Edges, find_edges
 from tasks.doors.lines import Lines, level_lines, upright_lines
 from tasks.doors.merging import Rectangles, per_door, per_wall
-from tasks.doors.openings import OpeningsParams, classified, door_probabilities
+from tasks.doors.openings import OpeningsParams, door_probabilities
 from tasks.doors.straightening import straightened
 
 Boxes = NDArray[np.float64]

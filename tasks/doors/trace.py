@@ -1,8 +1,5 @@
 """Label and depth images of all walls of a storey, by ray tracing (Sec. 5, Fig. 9)."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, PositiveInt
@@ -22,6 +19,7 @@ from tasks.doors.spacing import FINEST_M, spacing_m
 from tasks.doors.viewpoints import ViewParams, chosen, interior_eyes, of_room, snapshot_eyes
 from tasks.doors.voxels import DistanceField, distance_field
 from tasks.params import Params
+from tasks.threads import spread
 
 AIR_M = 1.0
 """Space kept around the rooms, metres: what is seen through windows and outer doors."""
@@ -243,7 +241,7 @@ def _cast(
     points: list[PointCloud],
     params: TraceParams,
 ) -> list[Votes]:
-    """Cast the rays of all faces; each thread takes the next face."""
+    """Cast the rays of all faces, in threads."""
     if not canvases:
         return []
     corners = np.concatenate([canvas.corners() for canvas in canvases])
@@ -253,8 +251,7 @@ def _cast(
     def one(face: int) -> Votes:
         return _votes(field, canvases[face], eyes[faces.rooms[face]], thickness[face], params)
 
-    with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
-        return list(threads.map(one, range(len(faces))))
+    return spread(one, range(len(faces)))
 
 
 def _eyes_of_rooms(

@@ -4,9 +4,9 @@ Grammars learn from bare storeys, each of a building's whole length; what tells 
 apart learns from small furnished ones and their scans.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -38,30 +38,80 @@ FIRST_SEEDS: Mapping[str, int] = {"office": 1000, "institute": 2000}
 """Seed of the first storey of each kind; the rest count on from it."""
 FURNISHED_SEED = 3000
 """Seed of the first furnished storey; the rest count on from it."""
-FURNISHED: Sequence[Mapping[str, Any]] = (
-    {"layout": "small"},
-    {"layout": "double_loaded", "double_loaded": DoubleLoadedParams(modules=8)},
-    {"layout": "open_plan", "open_plan": OpenPlanParams(modules=10)},
-    {"layout": "irregular", "irregular": IrregularParams(main_modules=8, wing_modules=5)},
-    {"layout": "small"},
-    {"layout": "double_loaded", "double_loaded": DoubleLoadedParams(modules=9)},
-    {"layout": "open_plan", "open_plan": OpenPlanParams(modules=11)},
-    {"layout": "irregular", "irregular": IrregularParams(main_modules=8, wing_modules=6)},
-    {"layout": "small"},
-    {"layout": "double_loaded", "double_loaded": DoubleLoadedParams(modules=10)},
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a furnished storey is laid out, how its doors stand, and who scans it."""
+
+    layout: Mapping[str, Any]
+    """of `StoreyParams`"""
+    states: tuple[float, float, float]
+    """shares of doors that are open, ajar and shut. Assumption."""
+    sensor: tuple[int, float]
+    """pixels a snapshot keeps and seconds between two: a third to a half of Tango's points. Fewer
+    are simulated in minutes. Assumption."""
+    volunteers: int = 3
+    skill: float = 0.7
+    """mean of the volunteers'"""
+
+
+SMALL: Mapping[str, Any] = {"layout": "small"}
+USUAL, OFTEN_SHUT, OFTEN_AJAR = (0.45, 0.2, 0.35), (0.25, 0.25, 0.5), (0.35, 0.4, 0.25)
+MOSTLY_SHUT = (0.2, 0.15, 0.65)
+SPARSE, DENSE, QUICK, SLOW = (12_000, 1.0), (20_000, 0.8), (12_000, 0.7), (9_000, 1.2)
+
+
+def _rows(modules: int, cut_outs: Literal[0, 1, 2] = 0) -> Mapping[str, Any]:
+    rows = DoubleLoadedParams(modules=modules, cut_outs=cut_outs)
+    return {"layout": "double_loaded", "double_loaded": rows}
+
+
+def _open_plan(modules: int) -> Mapping[str, Any]:
+    return {"layout": "open_plan", "open_plan": OpenPlanParams(modules=modules)}
+
+
+def _wings(main_modules: int, wing_modules: int) -> Mapping[str, Any]:
+    wings = IrregularParams(main_modules=main_modules, wing_modules=wing_modules)
+    return {"layout": "irregular", "irregular": wings}
+
+
+def _ring(least: int, most: int) -> Mapping[str, Any]:
+    return {"layout": "ring", "ring": RingParams(modules_min=least, modules_max=most)}
+
+
+FURNISHED = (
+    Kind(SMALL, USUAL, SPARSE),
+    Kind(_rows(8), OFTEN_SHUT, DENSE),
+    Kind(_open_plan(10), OFTEN_AJAR, QUICK),
+    Kind(_wings(8, 5), USUAL, SPARSE),
+    Kind(SMALL, OFTEN_SHUT, DENSE),
+    Kind(_rows(9), OFTEN_AJAR, QUICK),
+    Kind(_open_plan(11), USUAL, SPARSE),
+    Kind(_wings(8, 6), OFTEN_SHUT, DENSE),
+    Kind(SMALL, OFTEN_AJAR, QUICK),
+    Kind(_rows(10), USUAL, SPARSE),
+    # beyond the first ten: more doors that are shut, more volunteers and less skilled ones
+    Kind(_ring(6, 6), MOSTLY_SHUT, SPARSE, 6, 0.65),
+    Kind(_rows(9, 1), MOSTLY_SHUT, QUICK, 6, 0.75),
+    Kind(_wings(9, 5), OFTEN_SHUT, SPARSE, 6, 0.7),
+    Kind(SMALL, MOSTLY_SHUT, SLOW, 4, 0.6),
+    Kind(_open_plan(12), OFTEN_SHUT, SPARSE, 6, 0.8),
+    Kind(_rows(12, 2), MOSTLY_SHUT, SPARSE, 6, 0.7),
+    Kind(_ring(6, 7), OFTEN_SHUT, SPARSE, 6, 0.7),
+    Kind(_wings(9, 6), MOSTLY_SHUT, SLOW, 6, 0.8),
+    Kind(_rows(11), OFTEN_AJAR, SPARSE, 6, 0.6),
+    Kind(SMALL, MOSTLY_SHUT, DENSE, 4, 0.7),
+    Kind(_rows(13), OFTEN_SHUT, SPARSE, 6, 0.7),
+    Kind(_ring(7, 7), MOSTLY_SHUT, SPARSE, 6, 0.7),
 )
-"""The furnished storeys: 9 to 17 rooms each."""
+"""The furnished storeys: 9 to 24 rooms each."""
 DOORS_M = ((0.686, 0.811, 0.936), (0.811, 0.936, 1.061), (0.936, 1.061, 1.186))
 """Clear widths of doors, narrow, usual and wide: DIN 18101's leaves from 735 to 1235 mm."""
 HEADS_M = (1.968, 2.093)
 """Clear heights of doors: DIN 18101's wall openings of 2000 and 2125 mm less 32 mm of frame."""
-STATES = ((0.45, 0.2, 0.35), (0.25, 0.25, 0.5), (0.35, 0.4, 0.25))
-"""Shares of doors that are open, ajar and shut. Assumption."""
 BEARING_M = (0.115, 0.175, 0.24, 0.3)
 """Thicknesses of bearing walls: bricks of 115 to 300 mm (DIN 105)."""
-SENSORS = ((12_000, 1.0), (20_000, 0.8), (12_000, 0.7))
-"""Pixels a snapshot keeps and seconds between two: a third to a half of Tango's points. Fewer are
-simulated in minutes. Assumption."""
 
 
 def training_storeys(kind: str) -> tuple[Plan, ...]:
@@ -140,16 +190,16 @@ class FurnishedStorey:
 
 def furnished_storeys() -> tuple[FurnishedStorey, ...]:
     """Return small storeys with openings and furniture, no two built and scanned alike."""
-    return tuple(_furnished(i, FURNISHED_SEED + i, layout) for i, layout in enumerate(FURNISHED))
+    return tuple(_furnished(i, FURNISHED_SEED + i, kind) for i, kind in enumerate(FURNISHED))
 
 
-def _furnished(i: int, seed: int, layout: Mapping[str, Any]) -> FurnishedStorey:
+def _furnished(i: int, seed: int, kind: Kind) -> FurnishedStorey:
     rng = np.random.default_rng((seed, 0))
-    rays, interval_s = SENSORS[i % len(SENSORS)]
+    rays, interval_s = kind.sensor
     openings = OpeningParams(
         doors_m=DOORS_M[int(rng.integers(len(DOORS_M)))],
         door_head_m=float(rng.choice(HEADS_M)),
-        p_state=STATES[i % len(STATES)],
+        p_state=kind.states,
         window_m=_drawn(rng, 0.9, 2.0),
         sill_m=_drawn(rng, 0.3, 1.1),
         window_head_m=_drawn(rng, 2.0, 2.4),
@@ -168,11 +218,12 @@ def _furnished(i: int, seed: int, layout: Mapping[str, Any]) -> FurnishedStorey:
         inner_m=float(rng.choice(INNER_M)),
         openings=openings,
         furnishing=furnishing,
-        **layout,
+        **kind.layout,
     )
     campaign = CampaignParams(
         seed=seed,
-        volunteers=3,
+        volunteers=kind.volunteers,
+        skill=kind.skill,
         sensor=SensorParams(rays=rays),
         volunteer=VolunteerParams(interval_s=interval_s),
     )

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from tasks.threads import counted
+
 INTERVAL_S = 0.02
 _STATM = Path("/proc/self/statm")
 
@@ -18,7 +20,7 @@ class Cost:
 
     wall_s: float = 0.0
     cpu_s: float = 0.0
-    """of the thread the stage ran in"""
+    """of the thread the stage ran in, and of those it spread its work over"""
     peak_memory_mb: float | None = None
     """greatest resident memory of the whole process meanwhile, sampled; None where the system
     does not tell it"""
@@ -33,10 +35,11 @@ def metered() -> Iterator[Cost]:
     sampler.start()
     wall, cpu = time.perf_counter(), time.thread_time()
     try:
-        yield cost
+        with counted() as others:
+            yield cost
     finally:
         cost.wall_s = time.perf_counter() - wall
-        cost.cpu_s = time.thread_time() - cpu
+        cost.cpu_s = time.thread_time() - cpu + others.cpu_s
         done.set()
         sampler.join()
 

@@ -1,7 +1,7 @@
 """Score doors and windows on stored storeys: ours, the paper's way, ours without an ingredient.
 
     python tests/benchmarks/doors.py --from-store STORE ... --campaigns DIR [--seeds N]
-        [--storeys NAME ...] [--training DIR] [--jobs N] [--json FILE]
+        [--ablations N] [--storeys NAME ...] [--training DIR] [--jobs N] [--json FILE]
 
 Scored are the storeys of grammar.py but those that parameters were chosen on: the stores hold what
 `mapsense evaluate` made of them, the campaigns their truth. Nothing is mapped: the functions of the
@@ -10,6 +10,8 @@ door stages take the stored rooms, walls, points and snapshots.
 With --training, the work folder of `mapsense train doors`, ours is the forest that comes with
 MapSense, and the classifiers of other variants learn from the same storeys. Without, all learn from
 the storeys that parameters were chosen on, as the stores hold them.
+
+With --ablations, only ours and the paper's way see the seeds from that one on.
 """
 
 import argparse
@@ -29,15 +31,17 @@ from doorways.learning import TUNING, of_storey, of_training, only
 from doorways.storeys import TABLES, Costs, Doorways, Score
 from doorways.tables import costs_table, deciles_table, row, storeys_table, variants_table
 from doorways.truth import hidden_shares
-from doorways.variants import OURS, VARIANTS, Variant
+from doorways.variants import OURS, THE_PAPER, VARIANTS, Variant
 from numpy.typing import NDArray
 from report import Report, Target
 
 from flows.forests import shipped
+from flows.learners import OPENINGS_FOREST
 from storage.candidates import FEATURES
-from storage.forest import Forest, open_forest
+from storage.forest import Forest
+from tasks.doors.classifying import read_classifier
 from tasks.doors.examples import CLASSES
-from tasks.forest import Examples, ForestParams, fit, joined, predict
+from tasks.forest import Examples, fit, joined, predict
 from tasks.held_out import SVM_EXAMPLES, by_svm
 
 PLANES = """
@@ -47,6 +51,7 @@ with each as (
 )
 select building, storey, sum(cpu_s) as cpu_s from each group by all
 """
+MAIN = (OURS, THE_PAPER)
 TARGETS = (
     ("recall", "doors recall", 0.96, 0.99),
     ("precision", "doors precision", 0.90, 0.97),
@@ -75,7 +80,7 @@ class BySvm:
 
     def __call__(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return probabilities of classes."""
-        return by_svm(len(CLASSES), ForestParams())(self.examples, features)
+        return by_svm(len(CLASSES), OPENINGS_FOREST)(self.examples, features)
 
 
 def main() -> int:
@@ -88,12 +93,17 @@ def main() -> int:
         raise SystemExit("none of these storeys in the stores: name others with --from-store")
     with ProcessPoolExecutor(options.jobs) as pool:
         forest, examples, learnt = _learnt(options, stores, pool)
-        ways = {variant.name: _way(variant, forest, examples) for variant in VARIANTS}
+        wanted = VARIANTS if options.ablations != 0 else MAIN
+        ways = {variant.name: _way(variant, forest, examples) for variant in wanted}
         first = {model.scored.name: model for model in reversed(models)}
         hidden_in = partial(hidden_of, campaigns=options.campaigns)
         hidden = dict(zip(first, pool.map(hidden_in, first.values()), strict=True))
         run = partial(score_all, ways=ways, campaigns=options.campaigns)
-        results = list(pool.map(run, models, [hidden[m.scored.name] for m in models]))
+        variants = [
+            VARIANTS if options.ablations is None or m.seed < options.ablations else MAIN
+            for m in models
+        ]
+        results = list(pool.map(run, models, [hidden[m.scored.name] for m in models], variants))
     scores = [score for some, _ in results for score in some]
     costs = [of_model for _, of_model in results]
     report = _report(scores, costs, _planes(stores, storeys), learnt)
@@ -104,13 +114,17 @@ def main() -> int:
 
 
 def score_all(
-    stored: Stored, hidden: NDArray[np.float64], ways: dict[str, Way], campaigns: Path
+    stored: Stored,
+    hidden: NDArray[np.float64],
+    variants: Sequence[Variant],
+    ways: dict[str, Way],
+    campaigns: Path,
 ) -> tuple[list[Score], Costs]:
-    """Return the scores of all variants on one storey and seed, and what the steps cost."""
+    """Return the scores of variants on one storey and seed, and what the steps cost."""
     model = Doorways(stored, campaigns)
     model.warm_up()
     # ours last: by then all that is compiled has been loaded
-    order = sorted(VARIANTS, key=lambda v: (v.candidates == OURS.candidates, v == OURS))
+    order = sorted(variants, key=lambda v: (v.candidates == OURS.candidates, v == OURS))
     scores = [model.score(variant, ways[variant.name], hidden) for variant in order]
     print(f"{stored.scored.name}, seed {stored.seed}: scored", file=sys.stderr, flush=True)
     return scores, model.costs
@@ -127,7 +141,7 @@ def _learnt(
 ) -> tuple[Forest, Examples, str]:
     """Return our forest, the examples that others learn from, and what these are, in words."""
     if options.training is not None:
-        forest = open_forest(options.forest or shipped("doors"))
+        forest = read_classifier(options.forest or shipped("doors"))
         examples = of_training(options.training, forest)
         count = len(forest.provenance.storeys)
         return forest, examples, f"{count} training storeys, none of those scored"
@@ -136,7 +150,7 @@ def _learnt(
         raise SystemExit("none of the storeys to learn from in the stores: name --training")
     learn = partial(of_storey, campaigns=options.campaigns)
     examples = joined(list(pool.map(learn, tuning)))
-    forest = fit(examples, FEATURES, CLASSES, ForestParams())
+    forest = fit(examples, FEATURES, CLASSES, OPENINGS_FOREST)
     names = ", ".join(model.scored.name for model in tuning)
     return forest, examples, f"{names}, seed 0: no --training was named"
 
@@ -148,7 +162,7 @@ def _way(variant: Variant, forest: Forest, examples: Examples) -> Way:
         some = rng.permutation(len(examples))[:SVM_EXAMPLES]
         return BySvm(only(examples[some], known))
     if variant.features != forest.features:
-        forest = fit(only(examples, known), variant.features, CLASSES, ForestParams())
+        forest = fit(only(examples, known), variant.features, CLASSES, OPENINGS_FOREST)
     return partial(predict, forest)
 
 
@@ -157,6 +171,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--from-store", type=Path, nargs="+", required=True)
     parser.add_argument("--campaigns", type=Path, required=True, help="folder of all campaigns'")
     parser.add_argument("--seeds", type=int, default=10, help="repeats of each storey")
+    parser.add_argument("--ablations", type=int, help="seeds of the other variants; all without")
     names = ", ".join(s.name for s in STOREYS if s.name not in TUNING)
     parser.add_argument("--storeys", nargs="*", default=[], help=f"all without; of {names}")
     parser.add_argument("--training", type=Path, help="work folder of 'mapsense train doors'")
@@ -166,6 +181,8 @@ def _options() -> argparse.Namespace:
     options = parser.parse_args()
     if options.seeds < 1:
         parser.error(f"--seeds {options.seeds}: expected at least 1")
+    if options.ablations is not None and options.ablations < 0:
+        parser.error(f"--ablations {options.ablations}: expected at least 0")
     if options.forest is not None and options.training is None:
         parser.error("--forest: name its --training too, which other variants learn from")
     return options

@@ -13,15 +13,13 @@ from storage.artifacts import column, schema
 from storage.errors import InputError
 from storage.forest import (
     HEADER,
-    ClassScore,
     Forest,
-    Provenance,
-    TrainedStorey,
     open_forest,
     read_forest,
     to_table,
     write_forest,
 )
+from storage.forest_provenance import ClassScore, Provenance, TrainedStorey
 
 FEATURES, CLASSES = ("width_m", "height_m"), ("door", "window", "other")
 

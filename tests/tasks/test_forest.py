@@ -24,6 +24,7 @@ def reference(params):
         n_estimators=params.trees,
         max_depth=params.depth,
         min_samples_leaf=params.leaf,
+        max_samples=params.share,
         class_weight=None if params.class_weights == "equal" else "balanced",
         random_state=params.seed,
     )
@@ -36,6 +37,7 @@ def reference(params):
         ForestParams(trees=8, seed=5),
         ForestParams(trees=20, depth=3, class_weights="equal"),
         ForestParams(trees=3, leaf=1),
+        ForestParams(trees=6, share=0.25),
         ForestParams(trees=1, leaf=1000),  # nothing but a root
     ],
 )

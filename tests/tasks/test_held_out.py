@@ -5,6 +5,7 @@ import pytest
 
 from tasks.forest import Examples, ForestParams
 from tasks.held_out import (
+    FOLDS,
     by_svm,
     class_scores,
     cross_validated,
@@ -35,6 +36,22 @@ def test_each_group_is_asked_of_one_that_learnt_from_all_others():
     held_out(examples, 2, spy)
     names = {"b0/1", "b1/1", "b2/1"}
     assert asked == [(names - {name}, 80) for name in sorted(names)]
+
+
+def test_many_groups_are_held_back_several_at_a_time_and_each_once():
+    examples = drawn(groups=7)
+    learnt = []
+
+    def spy(some, features):
+        learnt.append(set(some.groups.tolist()))
+        return np.tile([0.0, 1.0], (len(features), 1))
+
+    told = held_out(examples, 2, spy)
+    names = set(examples.groups.tolist())
+    held = [names - some for some in learnt]
+    assert len(held) == FOLDS and set.union(*held) == names
+    assert sum(len(some) for some in held) == len(names)
+    assert (told[:, 1] == 1).all()
 
 
 def test_answers_come_back_in_the_order_of_the_examples():

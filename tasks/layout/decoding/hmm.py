@@ -13,13 +13,14 @@ rule j is left out of a step if even its most probable successor falls behind wh
 gives every successor. Only the probabilities are kept; the way back looks its maxima up again.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
+
+from tasks.threads import spread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -82,9 +83,8 @@ def viterbi(model: Model, observations: Floats, counts: Ints) -> tuple[Ints, Flo
         )  # fmt: skip
 
     # threads of our own: numba's may not be entered from several of a flow's threads at once
-    with ThreadPoolExecutor() as threads:
-        some = range(0, len(observations), LINES_AT_ONCE)
-        list(threads.map(decode, (slice(i, i + LINES_AT_ONCE) for i in some)))
+    some = range(0, len(observations), LINES_AT_ONCE)
+    spread(decode, (slice(i, i + LINES_AT_ONCE) for i in some))
     return paths, log_p
 
 

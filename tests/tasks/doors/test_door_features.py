@@ -63,6 +63,32 @@ def test_a_leaf_set_back_has_edges_all_around_and_steps_of_its_recess(scenes):
     assert max(beside["left_edge"], beside["right_edge"], beside["head_edge"]) == 0
 
 
+def test_rims_are_what_lies_just_within_a_side_behind_what_lies_beyond_its_frame(scenes):
+    face = scenes.Face(5.0, noise_m=0.02, seed=4).moved(LEAF, 0.03)
+    images = scenes.alone(face)
+    found, depth = measured(images, 0, LEAF), face_view(images, 0, PARAMS).depth.clip(-0.1, 0.1)
+    sides = {
+        "left_rim_m": (depth[30:34, 0:49], depth[24:28, 0:49]),
+        "right_rim_m": (depth[50:54, 0:49], depth[56:60, 0:49]),
+        "head_rim_m": (depth[30:54, 45:49], depth[30:54, 51:55]),
+    }
+    for name, (within, beyond) in sides.items():
+        assert found[name] == pytest.approx(np.nanmean(within) - np.nanmean(beyond), abs=1e-6)
+        assert found[name] == pytest.approx(0.03, abs=0.01)
+
+
+def test_a_windows_foot_is_wall_and_a_leafs_is_not(scenes):
+    window = (1.2, 2.16, 1.0, 1.96)
+    parapet = measured(scenes.alone(scenes.Face().moved(window, 0.075)), 0, LEAF)
+    leaf = measured(scenes.alone(scenes.Face().moved(LEAF, 0.075)), 0, LEAF)
+    assert parapet["foot_step_m"] == pytest.approx(0, abs=0.002)
+    assert leaf["foot_step_m"] == pytest.approx(0.075, abs=0.002)
+    # seen on one side alone
+    beside = scenes.Face().moved(LEAF, 0.075)
+    beside.depths[:30] = np.nan
+    assert measured(scenes.alone(beside), 0, LEAF)["foot_step_m"] == pytest.approx(0.075, abs=0.01)
+
+
 def test_a_frame_stands_out_of_the_wall_by_what_it_does(scenes):
     face = scenes.Face().moved((1.12, 2.24, 0, 2.04), -0.012).moved(LEAF, 0.012)
     assert measured(scenes.alone(face), 0, LEAF)["frame_m"] == pytest.approx(0.012, abs=0.004)
