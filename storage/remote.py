@@ -28,12 +28,15 @@ from storage.errors import StoreError
 T = TypeVar("T")
 
 REMOTE = "MAPSENSE_REMOTE"
-PAUSES_S = (0.5, 1.0, 2.0, 4.0)
+PAUSES_S = (1.0, 4.0)
 """Waited before what failed is tried again; the client itself has tried several times then."""
+GONE_S = 60.0
+"""After an address failed for good, nothing is asked of it for so long: all would wait in turn."""
 FINAL = (FileNotFoundError, PermissionError, ImportError)
 """What no second attempt changes."""
 THREADS = 8
 """Objects fetched at once."""
+_gone_until: dict[str, float] = {}
 CONTENT_NAMED = re.compile(r"[0-9a-f]{24}\.parquet")
 
 
@@ -112,20 +115,28 @@ class Remote:
         self._tried(f"{name} cannot be removed", attempt)
 
     def _tried(self, what: str, attempt: Callable[[], T]) -> T:
+        if time.monotonic() < _gone_until.get(self.url, 0.0):
+            raise self._error(what, "it was out of reach a moment ago")
         for pause in (*PAUSES_S, None):
             try:
                 return attempt()
             except FileNotFoundError:
                 raise
             except Exception as error:  # each client raises errors of its own
-                if pause is None or isinstance(error, FINAL):
+                final = isinstance(error, FINAL)
+                if pause is None or final:
+                    if not final:
+                        _gone_until[self.url] = time.monotonic() + GONE_S
                     text = " ".join(str(error).split())[:200] or type(error).__name__
-                    raise StoreError(
-                        f"{self.url}: {what} ({text}); check the address, the network and the "
-                        "credentials in the environment, then run again: nothing is lost"
-                    ) from error
+                    raise self._error(what, text) from error
                 time.sleep(pause)
         raise AssertionError("the last attempt returns or raises")
+
+    def _error(self, what: str, why: str) -> StoreError:
+        return StoreError(
+            f"{self.url}: {what} ({why}); check the address, the network and the credentials in "
+            "the environment, then run again: nothing is lost"
+        )
 
 
 def remote() -> Remote | None:

@@ -63,10 +63,11 @@ def address(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """An address in memory that every store shares meanwhile: stores are as on several machines."""
     import fsspec
 
-    from storage.remote import REMOTE
+    from storage import remote
 
     url = "memory://bucket/prefix"
-    monkeypatch.setenv(REMOTE, url)
+    monkeypatch.setenv(remote.REMOTE, url)
+    remote._gone_until.clear()
     memory = fsspec.filesystem("memory")
     yield url
     memory.store.clear()

@@ -164,6 +164,20 @@ def test_an_address_that_fails_for_good_is_named_with_the_remedy(
     assert ref.stat().st_size > 0  # nothing is lost here
 
 
+def test_an_address_that_is_gone_is_left_alone_for_a_while(
+    machines: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shared, "PAUSES_S", ())
+    failing = Failing(monkeypatch, failures=1)
+    for _ in range(3):
+        with pytest.raises(StoreError):
+            write(POINTS, cloud(), place(machines[0]))
+    assert failing.calls == 1
+    now = shared.time.monotonic()
+    monkeypatch.setattr(shared.time, "monotonic", lambda: now + shared.GONE_S + 1)
+    assert is_sound(write(POINTS, cloud(), place(machines[0])), machines[1])
+
+
 def test_a_refusal_is_not_tried_again(
     machines: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
