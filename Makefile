@@ -26,8 +26,12 @@ test: lint ## every check and every test
 bench: $(ENVIRONMENT) ## measure speed and accuracy
 	$(BIN)/python $(BENCHMARKS)
 
-ops: $(ENVIRONMENT) ## scheduled deployments on a Prefect server and worker, end to end
+ops: $(ENVIRONMENT) ## deployments end to end, on one machine and more; faults (PostgreSQL must be there)
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[scale]' --group services
 	$(BIN)/python tests/deployments/end_to_end.py
+	$(BIN)/python tests/deployments/end_to_end.py --postgres --workers 2 --dask 2 --s3
+	$(BIN)/python tests/deployments/composed.py
+	$(BIN)/python tests/faults/run.py --kills 10
 
 lint: $(ENVIRONMENT) ## style, types and the direction of imports
 	$(BIN)/ruff check .
@@ -47,8 +51,9 @@ $(ENVIRONMENT): setup.sh pyproject.toml constraints.txt
 
 # Keeps the pinned versions that still fit; UPGRADE=--upgrade takes the newest that fit together.
 constraints: ## resolve pyproject.toml into constraints.txt (needs uv)
-	uv pip compile --quiet --universal --python-version 3.11 --group dev --group setup $(UPGRADE) \
-	  --no-annotate --custom-compile-command 'make constraints' pyproject.toml -o constraints.txt
+	uv pip compile --quiet --universal --python-version 3.11 --extra scale --group dev \
+	  --group services --group setup $(UPGRADE) --no-annotate \
+	  --custom-compile-command 'make constraints' pyproject.toml -o constraints.txt
 
 clean: ## remove the environment, the caches and what the demo wrote
 	rm -rf .venv demo .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

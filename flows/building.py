@@ -7,8 +7,9 @@ from prefect.states import Failed
 
 from flows.hooks import publish, tell
 from flows.request import StoreyRequest
+from flows.runner import task_runner
 from flows.server import is_own
-from flows.storey import map_storey, threads
+from flows.storey import map_storey
 
 
 @flow(name="building", flow_run_name="{building}")
@@ -18,9 +19,9 @@ def map_building(building: str, storeys: list[StoreyRequest], jobs: int | None =
     Parameters
     ----------
     jobs : int, optional
-        Stages that run at once; None: one per processor.
+        Stages that run at once in threads; None: one per processor.
     """
-    mapping: Any = map_storey if jobs is None else with_jobs(jobs)
+    mapping = with_jobs(jobs)
     states = {request.storey: mapping(request, return_state=True) for request in storeys}
     failed = {storey: s.message for storey, s in states.items() if not s.is_completed()}
     if failed:
@@ -29,10 +30,12 @@ def map_building(building: str, storeys: list[StoreyRequest], jobs: int | None =
     return {storey: state.result() for storey, state in states.items()}
 
 
-def with_jobs(jobs: int) -> Any:
-    """Return the storey's flow with its own number of stages at once.
+def with_jobs(jobs: int | None) -> Any:
+    """Return the storey's flow with what its stages run in, see `flows.runner`.
 
     How a run ended is shown on the pages of Prefect's server, unless nobody ever sees these.
     """
     hooks: list[Any] = [tell] if is_own() else [tell, publish]
-    return map_storey.with_options(task_runner=threads(jobs), on_completion=hooks, on_failure=hooks)
+    return map_storey.with_options(
+        task_runner=task_runner(jobs), on_completion=hooks, on_failure=hooks
+    )

@@ -10,7 +10,7 @@ from prefect.futures import PrefectFuture
 from flows import progress, stages
 from flows.plans import plan_source
 from flows.request import Request
-from flows.storey import threads
+from flows.runner import threads
 from storage.artifacts import Place, read
 from storage.campaign import FILE, CampaignScan, CampaignStorey, read_campaign
 from storage.errors import InputError

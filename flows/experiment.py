@@ -16,9 +16,9 @@ from flows.outcomes import Outcome, RepeatsFailed
 from flows.params import MapSenseParams
 from flows.plans import true_plan
 from flows.repeat import Inputs, RepeatRequest, repeat
+from flows.runner import threads
 from flows.seeds import seeded
 from flows.settings import default_jobs
-from flows.storey import threads
 from storage.runs import new_id
 from tasks.scans.sources import find_sources
 

@@ -21,6 +21,7 @@ import fsspec
 from flows.listing import is_temporary, stamp_of
 from storage.errors import InputError
 from storage.files import write_whole
+from storage.remote import share
 
 INDEX = ".fetched.json"
 TIMES = ("LastModified", "last_modified", "mtime", "updated")
@@ -52,7 +53,8 @@ def mirror(url: str, folder: Path, settle_s: float, now: float) -> Mirror:
     url : str
         Address of a folder of scans: all its credentials come from the environment.
     folder : Path
-        Folder of all copies; each address has its own below it.
+        Folder of all copies in a store; each address has its own below it. What is fetched is
+        shared as the store is: stages that run on other machines read it too.
     settle_s : float
         An entry of which anything was written less than so many seconds ago is left for later.
     now : float
@@ -74,6 +76,7 @@ def mirror(url: str, folder: Path, settle_s: float, now: float) -> Mirror:
                 waiting.append(name)
             elif done.get(name) != entry.stamp:
                 _fetch(system, root, entry, copy / name)
+                share(folder.parent, *_files(copy / name))
                 done[name] = entry.stamp
                 _remember(copy, done)
     except InputError:
@@ -146,6 +149,11 @@ def _fetch(system: Any, root: str, entry: _Entry, target: Path) -> None:
         os.replace(fresh, target)
     finally:
         _remove(fresh)
+
+
+def _files(entry: Path) -> list[Path]:
+    """Return the files of a fetched entry."""
+    return [path for path in entry.rglob("*") if path.is_file()] if entry.is_dir() else [entry]
 
 
 def _fetched(copy: Path) -> dict[str, str]:

@@ -9,7 +9,6 @@ from typing import Any
 from prefect import flow
 from prefect.futures import PrefectFuture
 from prefect.states import Failed
-from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import progress, stages
 from flows.correction import correct
@@ -27,7 +26,7 @@ from flows.results import (
     write_results,
     write_summary,
 )
-from flows.settings import default_jobs
+from flows.runner import threads
 from storage.artifacts import Ref, read
 from storage.coverage import COVERAGE
 from storage.errors import StoreError
@@ -44,11 +43,6 @@ from storage.sources import Source
 from storage.stages import forget, reason
 from storage.walls import WALLS
 from tasks.scans.sources import find_sources
-
-
-def threads(jobs: int | None = None) -> Any:
-    """Return a task runner of a number of threads; None: one per processor."""
-    return ThreadPoolTaskRunner(max_workers=jobs or default_jobs())
 
 
 @flow(
@@ -216,7 +210,8 @@ def _mapped(
 
 def ending(asked: int, skipped: list[Skipped], mapped: Mapped | None) -> str:
     """Return what a person should know of how the run ended."""
-    ends = (_ending(asked, skipped, mapped), *(mapped.problems if mapped else ()))
+    noted = (*mapped.problems, mapped.corrected.note) if mapped else ()
+    ends = (_ending(asked, skipped, mapped), *noted)
     return "; ".join(end for end in ends if end)
 
 

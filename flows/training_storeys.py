@@ -9,7 +9,8 @@ from typing import Any
 from flows.campaign import Site, simulate
 from flows.params import MapSenseParams
 from flows.request import StoreyRequest
-from flows.storey import map_storey, threads
+from flows.runner import task_runner
+from flows.storey import map_storey
 from storage.artifacts import Place, Ref
 from storage.campaign import FILE, read_campaign
 from storage.errors import MapSenseError
@@ -90,7 +91,7 @@ def mapped(
         params=params.model_copy(update={"detect": ()}),  # what is to be learnt
         verb="train",
     )
-    mapping: Any = map_storey.with_options(task_runner=threads(jobs))
+    mapping: Any = map_storey.with_options(task_runner=task_runner(jobs))
     state = mapping(request, return_state=True)
     if not state.is_completed():
         error = state.result(raise_on_failure=False)

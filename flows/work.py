@@ -15,9 +15,9 @@ from flows.evaluation import EvaluationRequest, evaluate_storey
 from flows.experiment import ExperimentRequest, run_experiment
 from flows.outcomes import Outcome, RepeatsFailed
 from flows.request import StoreyRequest
+from flows.runner import task_runner
 from flows.server import wait_until_up
 from flows.settings import load_settings
-from flows.storey import threads
 from flows.summaries import read_summary
 from flows.training import TrainRequest, train
 from storage.catalog import Catalog
@@ -65,7 +65,8 @@ def run_buildings(requests: list[StoreyRequest], jobs: int, show: bool) -> list[
 def run_energy(request: EnergyRequest, jobs: int, show: bool) -> dict[str, pa.Table]:
     """Charge the methods for a campaign; return the answers people ask for, by title."""
     with _engine(show):
-        state = measure_energy.with_options(task_runner=threads(jobs))(request, return_state=True)
+        charging: Any = measure_energy.with_options(task_runner=task_runner(jobs))
+        state = charging(request, return_state=True)
     _raise_failure(state, request.building)
     of_rooms = {"building": request.building, "series": STOREY}  # not the accumulated ones
     return _answers(request.store, ENERGY_ANSWERS, of_rooms)
@@ -91,7 +92,7 @@ def run_evaluation(request: EvaluationRequest, show: bool) -> dict[str, pa.Table
 def run_repeats(request: ExperimentRequest, jobs: int, show: bool) -> list[Outcome]:
     """Run an experiment; return what came of each repeat, failed ones too."""
     with _engine(show):
-        at_once: Any = run_experiment.with_options(task_runner=threads(jobs))
+        at_once: Any = run_experiment.with_options(task_runner=task_runner(jobs))
         state = at_once(request, jobs, return_state=True)
     made = state.result(raise_on_failure=False)
     if isinstance(made, RepeatsFailed):
@@ -158,7 +159,9 @@ def _engine(show: bool) -> Iterator[None]:
 
 def _outcome(request: StoreyRequest, state: Any) -> dict[str, Any]:
     if state.is_completed():
-        return _summary(request)
+        # not the file: another run of the storey may have written its own there since
+        summary: dict[str, Any] = state.result()
+        return summary
     error = state.result(raise_on_failure=False)
     if isinstance(error, Exception) and not _recorded(request):
         raise error

@@ -53,7 +53,11 @@ def test_constraints_are_pins_without_an_address():
 @pytest.mark.parametrize("python", ["3.11", "3.12", "3.13"])
 @pytest.mark.parametrize(
     "dependency",
-    [*PYPROJECT["project"]["dependencies"], *GROUPS["dev"], *GROUPS["setup"]],
+    [
+        *PYPROJECT["project"]["dependencies"],
+        *PYPROJECT["project"]["optional-dependencies"]["scale"],
+        *(wanted for group in GROUPS.values() for wanted in group),
+    ],
     ids=lambda dependency: Requirement(dependency).name,
 )
 def test_a_direct_dependency_is_pinned_within_its_range(dependency, python):

@@ -170,7 +170,7 @@ def _answer(connection: Connection) -> Any:
         signature = signature_of(fn, stage)
     except Exception as error:
         connection.send(None)
-        return _portable(error)
+        return portable(error)
     connection.send(None)
     if timeout_s is not None:
         # its signal is the system's to deal with: it ends the process in any native call
@@ -180,12 +180,12 @@ def _answer(connection: Connection) -> Any:
             refs = compute(fn, signature, inputs)
         return refs, cost
     except Exception as error:
-        return _portable(error)
+        return portable(error)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-def _portable(error: Exception) -> Exception:
+def portable(error: Exception) -> Exception:
     """Return an error that another process can be told."""
     if isinstance(error, MemoryError):
         return MemoryError(str(error))

@@ -1,9 +1,13 @@
 """What a stage does, wherever it does it: read the inputs, compute, write the results."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from storage.artifacts import Place, Ref, write
+from storage.errors import InputError
+from storage.remote import refresh
+from storage.sources import Source
 from tasks.stage.signature import StageSignature
 
 
@@ -17,9 +21,30 @@ def compute(
     inputs : the place, and an argument of the function by each name: references for stored things
     """
     place: Place = inputs["place"]
+    for given in inputs.values():
+        if isinstance(given, Source):
+            _at_hand(given, place.store)
     values = {a.name: a.value(inputs[a.name], place.store) for a in signature.arguments}
     result = fn(**values)
     results = result if signature.several else (result,)
     return [
         write(kind, value, place) for kind, value in zip(signature.results, results, strict=True)
     ]
+
+
+def _at_hand(source: Source, store: str) -> None:
+    """Fetch a source that another machine copied into its store, if this one's lacks it.
+
+    Raises
+    ------
+    InputError
+        If it is not to be had on this machine.
+    """
+    path = Path(source.path)
+    if path.exists():
+        return
+    if path.is_relative_to(store):
+        refresh(store, path.relative_to(store).as_posix())
+    if not path.exists():
+        remedy = "give every machine that runs stages the same files under the same path"
+        raise InputError(path, "is not on the machine that runs the stage", remedy)

@@ -11,6 +11,7 @@ from typing import Any
 from storage import stages
 from storage.artifacts import Place, Ref
 from storage.stages import StageRow
+from tasks.stage import elsewhere
 from tasks.stage.meter import Cost
 
 Watcher = Callable[[Place, StageRow], None]
@@ -55,7 +56,7 @@ def forget(task_run: str) -> Asked | None:
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Call `watcher` with each row written by this process meanwhile: for progress."""
+    """Call `watcher` with each row written by this process meanwhile, or for it: for progress."""
     _watchers.append(watcher)
     try:
         yield
@@ -111,7 +112,13 @@ def _rows(refs: Sequence[Any], table: str | None = None) -> int:
     return sum(ref.rows for ref in refs if table is None or ref.table == table)
 
 
+def tell(place: Place, row: StageRow) -> None:
+    """Tell a row to who watches this process."""
+    for watcher in list(_watchers):
+        watcher(place, row)
+
+
 def _write(asked: Asked, row: StageRow) -> None:
     stages.append(asked.place, row)
-    for watcher in list(_watchers):
-        watcher(asked.place, row)
+    tell(asked.place, row)
+    elsewhere.send(asked.place, row)

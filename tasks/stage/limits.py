@@ -1,7 +1,8 @@
 """What a stage may take before it is stopped: seconds, memory.
 
 Both are of the machine a stage runs on, not of what it computes: so they come from the environment
-of its process, and no cache key knows them. `mapsense.toml` sets them for the processes it starts.
+of its process, and no cache key knows them. `mapsense.toml` sets them for the processes it starts;
+a worker of a Dask cluster that sets none is told those of the process that asks.
 """
 
 import os
@@ -29,16 +30,25 @@ class Limits:
         return self.timeout_s is not None or self.memory_mb is not None
 
 
-def limits() -> Limits:
+def limits(asked: Limits | None = None) -> Limits:
     """Return the limits of this process's stages.
+
+    Parameters
+    ----------
+    asked : Limits, optional
+        Those of the process that asks for a stage, if that is another: what this one leaves open.
 
     Raises
     ------
     MapSenseError
         If one is no positive number.
     """
+    asked = asked or Limits()
     memory_mb = _positive(MEMORY_MB)
-    return Limits(_positive(TIMEOUT_S), None if memory_mb is None else int(memory_mb))
+    return Limits(
+        _positive(TIMEOUT_S) or asked.timeout_s,
+        asked.memory_mb if memory_mb is None else int(memory_mb),
+    )
 
 
 def _positive(name: str) -> float | None:

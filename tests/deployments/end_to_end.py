@@ -1,8 +1,13 @@
 """Two buildings mapped by the clock, on a real Prefect server and worker; run by hand.
 
     python tests/deployments/end_to_end.py --work ops
+    python tests/deployments/end_to_end.py --postgres --workers 2 --dask 2 --s3 --apart
 
-What must hold is asserted, and told as it is seen:
+The second is what more than one machine needs: the server's database in PostgreSQL, two workers
+that take runs, stages on a Dask cluster, and stores that share an address of an S3-compatible
+service; with `--apart` each worker has a store of its own, as on a machine of its own. The extra
+`scale` and the dependency group `services` bring what it imports. What must hold is asserted, and
+told as it is seen:
 
 1. `mapsense deploy` registers two buildings; deployed again, nothing changes.
 2. The scheduler begins runs of both; the worker maps every storey.
@@ -10,12 +15,15 @@ What must hold is asserted, and told as it is seen:
 4. A scan dropped into one storey is the only thing computed at the next tick.
 5. Each event of a run is one JSON line on the worker's output; artifacts show each storey.
 6. A run that failed is retried by Prefect's own `flow-run retry`: only what failed is computed.
+7. With `--dask`: only processes of the cluster ran stages.
+8. With `--s3`: another machine, whose store is empty, maps a storey and computes nothing.
 
 It takes about three minutes on a machine with nothing else to do.
 """
 
 import argparse
 import json
+import os
 import shutil
 import tempfile
 import time
@@ -23,9 +31,10 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
-from services import ROOT, Services, services, wait_until, write_scan
+from services import BUCKET, ROOT, Services, Wanted, services, wait_until, write_scan
 
 from flows.server import empty_database
+from storage.remote import REMOTE, refresh
 
 NORTH = """
 building = "north"
@@ -72,17 +81,25 @@ def main() -> None:
     parser.add_argument(
         "--work", type=Path, help="folder, emptied first [default: a temporary one]"
     )
-    work = parser.parse_args().work
-    if work is None:
+    parser.add_argument("--postgres", action="store_true", help="PostgreSQL for the server")
+    parser.add_argument("--workers", type=int, default=1, help="workers that take runs")
+    parser.add_argument("--dask", type=int, default=0, help="workers of a Dask cluster")
+    parser.add_argument("--s3", action="store_true", help="share the store by an S3 service")
+    parser.add_argument(
+        "--apart", action="store_true", help="a store of its own for each worker, needs --s3, root"
+    )
+    given = parser.parse_args()
+    wanted = Wanted(given.postgres, given.dask, given.s3, given.apart)
+    if given.work is None:
         with tempfile.TemporaryDirectory(prefix="mapsense-ops-") as folder:
-            run(Path(folder))
+            run(Path(folder), wanted, given.workers)
     else:
-        shutil.rmtree(work, ignore_errors=True)
-        work.mkdir(parents=True)
-        run(work.resolve())
+        shutil.rmtree(given.work, ignore_errors=True)
+        given.work.mkdir(parents=True)
+        run(given.work.resolve(), wanted, given.workers)
 
 
-def run(folder: Path) -> None:
+def run(folder: Path, wanted: Wanted, workers: int) -> None:
     """Run every step on services of their own."""
     for storey, names in {"north-0": "a", "north-1": "c", "south-0": "d"}.items():
         write_scan(folder / "scans" / storey, names, seed=ord(names))
@@ -91,14 +108,23 @@ def run(folder: Path) -> None:
     shutil.copy(ROOT / "deployments" / "prefect.yaml", files)
     (files / "north.toml").write_text(NORTH)
     (files / "south.toml").write_text(SOUTH)
-    with services(folder, empty_database(folder / "empty")) as running:
+    with services(folder, empty_database(folder / "empty"), wanted) as running:
+        # what is read here of the store is what any machine would read
+        os.environ |= {
+            n: v for n, v in running.environment.items() if n.startswith((REMOTE, "AWS"))
+        }
         deploy(running)
-        running.worker("mapsense", "--limit", "1")
+        for number in range(workers):
+            running.worker("mapsense", "--limit", "1", "--name", f"worker {number}")
         by_the_clock(running)
         nothing_new(running)
         one_new(running)
         seen(running)
         retried(running)
+        if wanted.dask_workers:
+            on_the_cluster(running)
+        if wanted.s3:
+            from_elsewhere(running)
     print("all as it must be")
 
 
@@ -197,6 +223,28 @@ def retried(running: Services) -> None:
     told(f"retried, run {again['run_count']} of the same id: {again['state']['message']}")
 
 
+def on_the_cluster(running: Services) -> None:
+    """Look which processes wrote rows of stages: those of the cluster, and no others."""
+    refresh(running.folder / "store", "stages")
+    files = list((running.folder / "store" / "stages").rglob("*.parquet"))
+    # run-HHHHHHPID.NNNN.parquet, H of the machine
+    processes = {int(file.name.split(".")[-3].rpartition("-")[2][6:]) for file in files}
+    groups = {worker.pid for worker in running.dask}
+    assert processes and {os.getpgid(process) for process in processes} <= groups, files
+    told(f"all stages ran in {len(processes)} processes of the Dask cluster")
+
+
+def from_elsewhere(running: Services) -> None:
+    """Map a storey on a machine that has nothing but the address."""
+    scans = running.folder / "scans" / "north-1"
+    (running.folder / "mapsense.toml").write_text("params.detect = []\n")
+    where = ("--building", "north", "--storey", "1", "--store", str(running.folder / "elsewhere"))
+    done = running.mapsense("map", str(scans), *where, "--json")
+    costs = json.loads(done.stdout)["stages"].values()
+    assert sum(cost["computed"] for cost in costs) == 0, done.stdout
+    told(f"from {BUCKET}: {sum(c['cached'] for c in costs)} stages, none of them computed")
+
+
 def ended(running: Services, building: str) -> list[dict[str, Any]]:
     """Return a building's runs that have ended; the first is waited for."""
 
@@ -215,6 +263,7 @@ def has_ended(running: Services, run: str, count: int = 1) -> dict[str, Any] | N
 
 def rows(running: Services, table: str) -> list[dict[str, Any]]:
     """Return the rows of a history of the store, with their storey."""
+    refresh(running.folder / "store", table)
     found = []
     for path in (running.folder / "store" / table).rglob("*.parquet"):
         storey = next(p for p in path.parts if p.startswith("storey=")).removeprefix("storey=")

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 
 from storage.points import PointCloud
 from storage.pruning import prune
@@ -92,9 +93,9 @@ class Mapping:
         """Kill the process of the flow, -9."""
         self.process.send_signal(signal.SIGKILL)
 
-    def ended(self) -> Ended:
+    def ended(self, timeout_s: float = TIMEOUT_S) -> Ended:
         """Wait for its end."""
-        out, err = self.process.communicate(timeout=TIMEOUT_S)
+        out, err = self.process.communicate(timeout=timeout_s)
         return Ended(self.process.returncode, out, err)
 
     def __enter__(self) -> "Mapping":
@@ -166,6 +167,17 @@ def kill_and_rerun(store: Path, scans: Path, seed: int, of: int, **environment: 
     return f"{'killed' if code == -9 else 'ended'} at {left} of {of} artifacts"
 
 
+def spawned_by(process: int) -> list[int]:
+    """Return the processes that a process has started by `multiprocessing`, and that go on."""
+    found = []
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in path.read_text().split():
+                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    found.append(int(child))
+    return found
+
+
 def two_at_once(store: Path, scans: Path, **environment: str) -> tuple[Ended, Ended]:
     """Map the storey twice at the same time."""
     with Mapping(store, scans, **environment) as one, Mapping(store, scans, **environment) as other:
@@ -175,6 +187,13 @@ def two_at_once(store: Path, scans: Path, **environment: str) -> tuple[Ended, En
 def computed(ended: Ended) -> int:
     """Return how many stages a run computed."""
     return sum(cost["computed"] for cost in ended.summary()["stages"].values())
+
+
+def computed_in(store: Path) -> int:
+    """Return how many stages all runs in a store have computed."""
+    files = (store / "stages").rglob("*.parquet")
+    tables = [pq.read_table(file, columns=["outcome"], partitioning=None) for file in files]
+    return sum(table["outcome"].to_pylist().count("computed") for table in tables)
 
 
 @contextmanager

@@ -3,24 +3,35 @@
     python tests/faults/run.py --kills 10
 
 Each fault has a store of its own. After it the storey is mapped again, and pruned: artifacts, cache
-and plans must be those of a store that nothing was done to, byte by byte.
+and plans must be those of a store that nothing was done to, byte by byte. The faults of a Dask
+cluster and of an S3-compatible service need the extra `scale` and the dependency group `services`.
 """
 
 import argparse
 import os
+import random
+import signal
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent), str(ROOT / "tests" / "deployments")]
 
 import harming  # noqa: E402
+import sharing  # noqa: E402
+from faulty import CUT, ERROR, RESET, SLOW, faulty  # noqa: E402
+from faulty import Faults as Answers  # noqa: E402
+from services import Services, Wanted, services, wait_until  # noqa: E402
 
-from flows.server import SETTINGS, wait_until_up  # noqa: E402
+from flows.server import SETTINGS, empty_database, wait_until_up  # noqa: E402
 
+PATIENCE_S = 1800
+"""For a run whose every request is refused: each is tried again and again."""
 POISON_MEMORY_MB, POISON_POINTS, POISON_TIMEOUT_S = 700, 30_000_000, 60
 
 
@@ -28,12 +39,31 @@ class Faults:
     """The faults, each done to a store of its own."""
 
     def __init__(self, folder: Path, home: Path) -> None:
-        self.folder, self.home = folder, home
+        self.folder, self.home, self._stack = folder, home, ExitStack()
         self.scans = harming.write_scans(folder / "scans")
         first = harming.run(folder / "undisturbed", self.scans)
         assert first.code == 0, first.err
         self.whole = len(harming.artifacts_of(folder / "undisturbed"))
         self.undisturbed = harming.results(folder / "undisturbed")
+
+    def __enter__(self) -> "Faults":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    @cached_property
+    def running(self) -> Services:
+        """A Prefect server and a Dask cluster that live as long as the faults."""
+        folder = self.folder / "services"
+        folder.mkdir()
+        wanted = Wanted(dask_workers=2)
+        return self._stack.enter_context(services(folder, empty_database(self.home), wanted))
+
+    @cached_property
+    def bucket(self) -> dict[str, str]:
+        """An S3-compatible service, as it is set."""
+        return self.running.bucket()
 
     def kill(self, seed: int) -> str:
         """Kill -9 of the flow."""
@@ -61,6 +91,66 @@ class Faults:
         harming.check_same(store, self.undisturbed)
         return f"exit code {ended.code} after {time.monotonic() - began:.0f} s: {said}"
 
+    def kill_dask_worker(self, seed: int, whole: bool) -> str:
+        """Kill -9 of a Dask worker at a moment drawn; with `whole`, of its nanny too."""
+        store = self.folder / f"cluster-{seed}-{whole}"
+        address = self.running.environment["MAPSENSE_DASK"]
+        cluster = {"PREFECT_API_URL": self.running.url, "MAPSENSE_DASK": address}
+        nanny = random.Random(seed).choice([w for w in self.running.dask if w.poll() is None])
+        moment = random.Random(seed).randrange(self.whole // 2)
+        with harming.Mapping(store, self.scans, **cluster) as mapping:
+            assert mapping.wait_for(moment), mapping.ended().err
+            (worker,) = wait_until(lambda: harming.spawned_by(nanny.pid), 60, 0.02)
+            os.kill(worker, signal.SIGKILL)
+            if whole:
+                os.killpg(nanny.pid, signal.SIGKILL)
+            left = len(harming.artifacts_of(store))
+            ended = mapping.ended()
+        if whole:
+            self.running.dask_worker(address)  # another machine in its place
+        assert ended.code == 0, ended.err
+        again = harming.run(store, self.scans)
+        assert (again.code, harming.computed(again)) == (0, 0), again.err
+        harming.check_same(store, self.undisturbed)
+        return f"at {left} of {self.whole} artifacts; the run completed, on threads nothing is new"
+
+    def bad_answers(self, seed: int) -> str:
+        """S3 errors, slow answers, connections that break."""
+        store, address = self.folder / f"shared-{seed}", self.shared_at(f"bad-{seed}")
+        often = {ERROR: 0.08, SLOW: 0.08, RESET: 0.04, CUT: 0.04}
+        answers = Answers(often, seed)
+        with faulty(address["AWS_ENDPOINT_URL"], answers) as url:
+            ended = harming.run(store, self.scans, **address | {"AWS_ENDPOINT_URL": url})
+        assert ended.code == 0, ended.err
+        harming.check_same(store, self.undisturbed)
+        sharing.check_same(address, self.undisturbed)
+        return ", ".join(f"{count} {fault}" for fault, count in sorted(answers.happened.items()))
+
+    def service_gone(self) -> str:
+        """An S3 service that is gone in the midst of a run, and back for the next."""
+        store, address = self.folder / "gone", self.shared_at("gone")
+        answers = Answers({})
+        with faulty(address["AWS_ENDPOINT_URL"], answers) as url:
+            # the client itself tries once: else each request takes minutes to be given up
+            asked = address | {"AWS_ENDPOINT_URL": url, "AWS_MAX_ATTEMPTS": "1"}
+            with harming.Mapping(store, self.scans, **asked) as mapping:
+                assert mapping.wait_for(self.whole // 3), mapping.ended().err
+                answers.shares = {ERROR: 1.0}
+                began = time.monotonic()
+                ended = mapping.ended(PATIENCE_S)
+                took = time.monotonic() - began
+            assert ended.code == 1, ended
+            answers.shares = {}
+            again = harming.run(store, self.scans, **asked)
+        assert again.code == 0, again.err
+        harming.check_same(store, self.undisturbed)
+        sharing.check_same(address, self.undisturbed)
+        return f"after {took:.0f} s: " + ended.err.strip().rpartition("\n")[2]
+
+    def shared_at(self, name: str) -> dict[str, str]:
+        """Return what is set to share an address of its own."""
+        return self.bucket | {"MAPSENSE_REMOTE": f"s3://{sharing.BUCKET}/{name}"}
+
     def fill_disk(self) -> str:
         """Disk full, then enlarged."""
         store = self.folder / "full"
@@ -86,10 +176,11 @@ class Faults:
         store = self.folder / "both"
         one, other = harming.two_at_once(store, self.scans)
         assert (one.code, other.code) == (0, 0), one.err + other.err
-        once = [harming.computed(one), harming.computed(other)]
+        computed = harming.computed_in(store)  # one's summary may be there in place of the other's
         harming.check_same(store, self.undisturbed)
-        assert sum(once) == harming.computed(harming.run(self.folder / "counted", self.scans))
-        return f"{once[0]} and {once[1]} stages computed, none twice"
+        alone = harming.computed(harming.run(self.folder / "counted", self.scans))
+        assert computed == alone, f"{computed} stages computed, {alone} by one flow"
+        return f"{computed} stages computed, none twice"
 
     def poison(self) -> str:
         """A scan that hangs, and one that exhausts memory."""
@@ -126,6 +217,10 @@ def faults(asked: Faults, kills: int, seed: int) -> Iterator[tuple[str, Callable
     yield "two flows on one storey", asked.two_at_once
     yield "disk full", asked.fill_disk
     yield "poison", asked.poison
+    yield "kill -9 of a Dask worker", lambda: asked.kill_dask_worker(seed, whole=False)
+    yield "a Dask worker's machine lost", lambda: asked.kill_dask_worker(seed + 1, whole=True)
+    yield "bad answers of S3", lambda: asked.bad_answers(seed)
+    yield "S3 gone meanwhile", asked.service_gone
 
 
 def main() -> None:
@@ -141,17 +236,17 @@ def main() -> None:
     lost = 0
     with tempfile.TemporaryDirectory(prefix="mapsense-faults-") as folder:
         home = Path(os.environ.setdefault("PREFECT_HOME", f"{folder}/prefect"))
-        every = faults(Faults(Path(folder), home), given.kills, given.seed)
-        for name, fault in every:
-            if given.only not in name:
-                continue
-            began = time.monotonic()
-            try:
-                said = fault()
-            except AssertionError as error:
-                lost += 1
-                said = f"FAILED: {error}"
-            print(f"{name}: {said} ({time.monotonic() - began:.0f} s)", flush=True)
+        with Faults(Path(folder), home) as every:
+            for name, fault in faults(every, given.kills, given.seed):
+                if given.only not in name:
+                    continue
+                began = time.monotonic()
+                try:
+                    said = fault()
+                except AssertionError as error:
+                    lost += 1
+                    said = f"FAILED: {error}"
+                print(f"{name}: {said} ({time.monotonic() - began:.0f} s)", flush=True)
     print("nothing was lost" if not lost else f"{lost} faults lost something")
     sys.exit(1 if lost else 0)
 

@@ -226,3 +226,23 @@ def test_a_run_whose_process_died_is_shown_as_interrupted_and_run_again(
     code, out, _ = mapsense("rerun", "--store", "store")
     assert code == 0
     assert "hut/0: 1 room, " in out
+
+
+def test_a_run_tells_its_own_summary_though_another_of_the_storey_wrote_there_since(
+    mapsense, served, cloud, tmp_path, monkeypatch
+):
+    from flows import storey
+
+    write = storey.write_summary
+
+    def overtaken(request, summary):
+        write(request, summary)
+        write(request, {"run": "another's"})
+
+    monkeypatch.setattr(storey, "write_summary", overtaken)
+    write_bundle(tmp_path / "a.scan", cloud, none())
+    asked = ("a.scan", "--building", "hut", "--storey", "0", "--store", "store", "--json")
+    code, out, _ = mapsense("map", *asked)
+    summary = json.loads(out)
+    assert (code, summary["state"], summary["found"]["rooms"]) == (0, "completed", 1)
+    assert summary["stages"]["planes"]["computed"] == 1
