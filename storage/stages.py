@@ -9,7 +9,8 @@ however many came before it.
 import os
 import socket
 import threading
-from collections import defaultdict
+import time
+from collections import OrderedDict
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from hashlib import sha256
@@ -75,40 +76,51 @@ SCHEMA = schema(
 
 FULL_ROWS = 256
 """Rows of a file that is followed by another."""
+OPEN_RUNS = 64
+"""Runs whose last file a process keeps in mind: a worker of a cluster takes part in many."""
 
 
 @dataclass
 class _Written:
-    """What this process has written of a run."""
+    """The file this process writes of a run, and its rows."""
 
+    path: Path | None = None
     rows: list[StageRow] = field(default_factory=list)
     writing: threading.Lock = field(default_factory=threading.Lock)
     sharing: threading.Lock = field(default_factory=threading.Lock)
-    shared: dict[Path, int] = field(default_factory=dict)
-    """rows there were when a file was put where others see it"""
+    shared: tuple[Path | None, int] = (None, 0)
+    """the file that was last put where others see it, and its rows then"""
 
 
-_written: dict[tuple[str, str, str], _Written] = defaultdict(_Written)
+_written: OrderedDict[tuple[str, str, str], _Written] = OrderedDict()
 _mutex = threading.Lock()
 
 
 def append(place: Place, row: StageRow) -> None:
     """Add a row to the file this process keeps for the place's run and storey."""
     folder = place.model_copy(update={"scan": None}).folder("stages")
+    key = (place.store, folder, place.run)
     with _mutex:
-        written = _written[place.store, folder, place.run]
+        written = _written.setdefault(key, _Written())
+        _written.move_to_end(key)
+        if len(_written) > OPEN_RUNS:  # one that comes again begins another file
+            _written.popitem(last=False)
     with written.writing:
+        if written.path is None or len(written.rows) >= FULL_ROWS:
+            # by time, so that the files of a process are read in the order they were written in
+            name = f"{place.run}-{_process()}.{time.time_ns():016x}.parquet"
+            written.path, written.rows = Path(place.store) / folder / name, []
         written.rows.append(row)
-        count = len(written.rows)
-        full = (count - 1) // FULL_ROWS
-        path = Path(place.store) / folder / f"{place.run}-{_process()}.{full:04d}.parquet"
-        replace_table(path, to_table(written.rows[full * FULL_ROWS :]))
+        path, count = written.path, len(written.rows)
+        replace_table(path, to_table(written.rows))
     with written.sharing:
-        if written.shared.get(path, 0) < count:
+        before, put = written.shared
+        if before != path or put < count:
             with written.writing:
-                count = len(written.rows)  # those that others wrote meanwhile go with it
+                if written.path == path:
+                    count = len(written.rows)  # those that others wrote meanwhile go with it
             share(place.store, path)
-            written.shared[path] = count
+            written.shared = (path, count)
 
 
 def of_run(place: Place) -> list[StageRow]:
