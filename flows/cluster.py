@@ -137,6 +137,8 @@ def _client(settings: dict[str, Any]) -> Iterator[None]:
 class ClusterFuture(PrefectDaskFuture[Any]):
     """A stage on the cluster."""
 
+    _final_state: Any
+
     def wait(self, timeout: float | None = None) -> None:
         """Wait for the stage; one that no worker could end is a crash, and says why."""
         super().wait(timeout)

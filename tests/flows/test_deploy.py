@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from prefect.utilities.asyncutils import run_coro_as_sync
 
 from flows.cli import main
 from flows.logs import event, written
@@ -97,6 +98,26 @@ def test_a_building_whose_file_is_gone_is_told(deploy):
     assert not {"mapping/old", "mapping/new"} & set(left)
     _, left = deploy(new=STOREY)
     assert "mapping/old" in left
+
+
+def test_a_secret_block_reaches_a_runs_environment_and_no_deployment(deploy, client, tmp_path):
+    from prefect.blocks.system import Secret
+    from prefect.workers.process import ProcessJobConfiguration
+
+    Secret(value="hunter2-s3").save("mapsense-s3", overwrite=True)
+    path = tmp_path / "deployments" / "prefect.yaml"
+    named = '          AWS_SECRET_ACCESS_KEY: "{{ prefect.blocks.secret.mapsense-s3 }}"\n'
+    path.write_text(path.read_text().replace("        env:\n", "        env:\n" + named))
+    deploy(vault=STOREY)
+    made = client.read_deployment_by_name("mapping/vault")
+    assert "hunter2-s3" not in made.model_dump_json()
+
+    template = client.read_work_pool("mapsense").base_job_template
+    job = run_coro_as_sync(
+        ProcessJobConfiguration.from_template_and_values(template, made.job_variables)
+    )
+    assert job.env["AWS_SECRET_ACCESS_KEY"] == "hunter2-s3"
+    assert job.env["OMP_NUM_THREADS"] == "1"
 
 
 @pytest.fixture(scope="module")
