@@ -19,9 +19,9 @@ from typing import Any
 import fsspec
 
 from flows.listing import is_temporary, stamp_of
-from storage.errors import InputError
+from storage.errors import InputError, MapSenseError
 from storage.files import write_whole
-from storage.remote import share
+from storage.remote import publish
 
 INDEX = ".fetched.json"
 TIMES = ("LastModified", "last_modified", "mtime", "updated")
@@ -76,10 +76,10 @@ def mirror(url: str, folder: Path, settle_s: float, now: float) -> Mirror:
                 waiting.append(name)
             elif done.get(name) != entry.stamp:
                 _fetch(system, root, entry, copy / name)
-                share(folder.parent, *_files(copy / name))
+                publish(folder.parent, copy / name)
                 done[name] = entry.stamp
                 _remember(copy, done)
-    except InputError:
+    except MapSenseError:
         raise
     except ImportError as error:
         remedy = "install it where the worker runs"
@@ -90,6 +90,7 @@ def mirror(url: str, folder: Path, settle_s: float, now: float) -> Mirror:
         raise InputError(url, f"cannot be read ({text})", remedy) from error
     for name in set(done) - set(entries):
         _remove(copy / name)
+        publish(folder.parent, copy / name)
         _remember(copy, {kept: done[kept] for kept in done if kept in entries})
     copy.mkdir(parents=True, exist_ok=True)
     return Mirror(copy, tuple(waiting))
@@ -149,11 +150,6 @@ def _fetch(system: Any, root: str, entry: _Entry, target: Path) -> None:
         os.replace(fresh, target)
     finally:
         _remove(fresh)
-
-
-def _files(entry: Path) -> list[Path]:
-    """Return the files of a fetched entry."""
-    return [path for path in entry.rglob("*") if path.is_file()] if entry.is_dir() else [entry]
 
 
 def _fetched(copy: Path) -> dict[str, str]:

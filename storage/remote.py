@@ -199,6 +199,29 @@ def refresh(store: Path | str, folder: str) -> None:
         list(threads.map(fetch, stale))
 
 
+def publish(store: Path | str, path: Path) -> None:
+    """Make a file or folder of a store at its address what it is here; gone, if it is gone."""
+    if (at := remote()) is None:
+        return
+    here = _files(path)
+    share(store, *here)
+    names = {file.relative_to(store).as_posix() for file in here}
+    for name in at.find(path.relative_to(store).as_posix()).keys() - names:
+        at.remove(name)
+
+
+def replicate(store: Path | str, path: Path) -> None:
+    """Make a file or folder of a store what it is at its address, if it is there."""
+    if (at := remote()) is None:
+        return
+    folder = path.relative_to(store).as_posix()
+    refresh(store, folder)
+    there = at.find(folder)
+    for file in _files(path) if there else ():
+        if file.relative_to(store).as_posix() not in there:
+            file.unlink(missing_ok=True)
+
+
 def is_content_named(name: str) -> bool:
     """Return whether a file is named by its content, so that it never changes."""
     return bool(CONTENT_NAMED.fullmatch(name.rpartition("/")[2]))
@@ -215,6 +238,12 @@ def _is_stale(path: Path, found: Object) -> bool:
     return copy.st_mtime < found.changed_at or (
         copy.st_mtime == found.changed_at and copy.st_size != found.size
     )
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        return [file for file in path.rglob("*") if file.is_file()]
+    return [path] if path.exists() else []
 
 
 def _fetch(at: Remote, name: str, path: Path) -> None:

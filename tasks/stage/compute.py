@@ -6,7 +6,7 @@ from typing import Any
 
 from storage.artifacts import Place, Ref, write
 from storage.errors import InputError
-from storage.remote import refresh
+from storage.remote import replicate
 from storage.sources import Source
 from tasks.stage.signature import StageSignature
 
@@ -33,7 +33,7 @@ def compute(
 
 
 def _at_hand(source: Source, store: str) -> None:
-    """Fetch a source that another machine copied into its store, if this one's lacks it.
+    """Fetch a source that another machine copied into its store, as it is there now.
 
     Raises
     ------
@@ -41,10 +41,8 @@ def _at_hand(source: Source, store: str) -> None:
         If it is not to be had on this machine.
     """
     path = Path(source.path)
-    if path.exists():
-        return
     if path.is_relative_to(store):
-        refresh(store, path.relative_to(store).as_posix())
+        replicate(store, path)
     if not path.exists():
         remedy = "give every machine that runs stages the same files under the same path"
         raise InputError(path, "is not on the machine that runs the stage", remedy)

@@ -1,6 +1,7 @@
 """Stores that share an address: two folders and a file system in memory stand for two machines."""
 
 import os
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -220,6 +221,28 @@ class Failing:
             put_file(*args, **kwargs)
 
         monkeypatch.setattr(MemoryFileSystem, "put_file", put)
+
+
+def test_a_folder_is_published_and_replicated_as_it_is_now(machines: tuple[str, str]) -> None:
+    one, two = (Path(machine) for machine in machines)
+
+    def put(files: dict[str, bytes]) -> None:
+        shutil.rmtree(one / "x", ignore_errors=True)
+        for name, data in files.items():
+            (one / "x" / name).parent.mkdir(parents=True, exist_ok=True)
+            (one / "x" / name).write_bytes(data)
+        shared.publish(one, one / "x")
+
+    def got() -> dict[str, bytes]:
+        shared.replicate(two, two / "x")
+        files = [path for path in (two / "x").rglob("*") if path.is_file()]
+        return {path.relative_to(two / "x").as_posix(): path.read_bytes() for path in files}
+
+    for files in ({"a": b"1", "b/c": b"2"}, {"a": b"one", "d": b"3"}):
+        put(files)
+        assert got() == files
+    put({})
+    assert got() == files  # nothing is there any more: what is here stays
 
 
 def test_a_reference_of_nothing_is_told(machines: tuple[str, str]) -> None:
