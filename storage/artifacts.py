@@ -6,7 +6,6 @@ An artifact is one immutable Parquet file, named by the hash of its content. A s
 
 import os
 import re
-import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, field_validator
 
 from storage.errors import DamagedArtifact, StoreError
+from storage.files import temporary_in
 from storage.remote import obtain, share
 
 T = TypeVar("T")
@@ -145,8 +145,7 @@ def replace_table(path: Path, table: pa.Table) -> None:
 @contextmanager
 def _written(table: pa.Table, folder: Path, options: dict[str, Any]) -> Iterator[Path]:
     """Write beside the target and sync; renamed within, a reader sees all of it or nothing."""
-    # a dot file: no *.parquet glob sees it before the rename
-    temporary = folder / f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp"
+    temporary = temporary_in(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with open(temporary, "wb") as file:

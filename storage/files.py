@@ -8,6 +8,11 @@ from pathlib import Path
 from storage.errors import StoreError
 
 
+def temporary_in(folder: Path) -> Path:
+    """Return a new name for what is still being written: no pattern of whole files has it."""
+    return folder / f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp"
+
+
 def write_whole(path: Path, data: bytes, what: str) -> None:
     """Write a file beside its target, sync, rename: a reader sees all of it or nothing.
 
@@ -16,7 +21,7 @@ def write_whole(path: Path, data: bytes, what: str) -> None:
     StoreError
         Naming the file, `what` it was to hold, and the remedy.
     """
-    temporary = path.with_name(f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp")
+    temporary = temporary_in(path.parent)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(temporary, "wb") as file:

@@ -13,8 +13,7 @@ AWS_ENDPOINT_URL, ...). Without the setting, nothing here does anything.
 import os
 import re
 import time
-import uuid
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from storage.errors import StoreError
+from storage.files import temporary_in
 
 T = TypeVar("T")
 
@@ -186,17 +186,8 @@ def is_held(store: Path | str, name: str) -> bool:
 
 def refresh(store: Path | str, folder: str) -> None:
     """Bring a folder of a store up to date with its address."""
-    if (at := remote()) is None:
-        return
-    root = Path(store)
-
-    def fetch(name: str) -> None:
-        with suppress(FileNotFoundError):  # removed meanwhile
-            _fetch(at, name, root / name)
-
-    stale = [n for n, found in at.find(folder).items() if _is_stale(root / n, found)]
-    with ThreadPoolExecutor(THREADS) as threads:
-        list(threads.map(fetch, stale))
+    if (at := remote()) is not None:
+        _bring_up_to_date(at, Path(store), at.find(folder))
 
 
 def publish(store: Path | str, path: Path) -> None:
@@ -214,9 +205,8 @@ def replicate(store: Path | str, path: Path) -> None:
     """Make a file or folder of a store what it is at its address, if it is there."""
     if (at := remote()) is None:
         return
-    folder = path.relative_to(store).as_posix()
-    refresh(store, folder)
-    there = at.find(folder)
+    there = at.find(path.relative_to(store).as_posix())
+    _bring_up_to_date(at, Path(store), there)
     for file in _files(path) if there else ():
         if file.relative_to(store).as_posix() not in there:
             file.unlink(missing_ok=True)
@@ -225,6 +215,18 @@ def replicate(store: Path | str, path: Path) -> None:
 def is_content_named(name: str) -> bool:
     """Return whether a file is named by its content, so that it never changes."""
     return bool(CONTENT_NAMED.fullmatch(name.rpartition("/")[2]))
+
+
+def _bring_up_to_date(at: Remote, store: Path, there: Mapping[str, Object]) -> None:
+    """Fetch those of the objects that are others than their copies in a store."""
+
+    def fetch(name: str) -> None:
+        with suppress(FileNotFoundError):  # removed meanwhile
+            _fetch(at, name, store / name)
+
+    stale = [name for name, found in there.items() if _is_stale(store / name, found)]
+    with ThreadPoolExecutor(THREADS) as threads:
+        list(threads.map(fetch, stale))
 
 
 def _is_stale(path: Path, found: Object) -> bool:
@@ -249,7 +251,7 @@ def _files(path: Path) -> list[Path]:
 def _fetch(at: Remote, name: str, path: Path) -> None:
     """Fetch an object beside its place, and put it there unless we wrote there meanwhile."""
     before = _stat(path)
-    temporary = path.with_name(f".{os.getpid()}-{uuid.uuid4().hex[:12]}.tmp")
+    temporary = temporary_in(path.parent)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         found = at.get(name, temporary)
